@@ -1,0 +1,30 @@
+# make demo   the head verges on a simulated target, and a report is written to out/demo
+# make test   every test
+# make lint   ruff format and lint, mypy
+# make bench  every benchmark (ONLY=name for one), results in out/bench
+# make setup  only the environment and the build
+# All of them make .venv and install/ first, or find them ready.
+SHELL := /bin/bash
+.DEFAULT_GOAL := demo
+.PHONY: setup setup-dev demo test lint bench study clean
+
+setup:
+	@bash tools/bootstrap.sh run
+
+setup-dev:
+	@bash tools/bootstrap.sh dev
+
+demo: setup
+	@source env.sh && exec vergence demo $(ARGS)
+
+test: setup-dev
+	@source env.sh && exec python -m pytest $(ARGS)
+
+lint: setup-dev
+	@source env.sh && ruff format --check . && ruff check . && mypy
+
+bench: setup-dev
+	@source env.sh && exec python -m bench $(if $(ONLY),--only $(ONLY))
+
+clean:
+	rm -rf .venv build install log out

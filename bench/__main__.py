@@ -1,0 +1,42 @@
+"""Run every benchmark, or the one named by --only, and print their tables."""
+
+import argparse
+import importlib
+import pkgutil
+import sys
+import time
+
+import bench
+from bench import harness
+
+
+def names() -> list[str]:
+    """Return the names of all benchmarks: bench_NAME.py beside this file."""
+    return sorted(m.name.removeprefix("bench_") for m in pkgutil.iter_modules(bench.__path__) if m.name[:6] == "bench_")
+
+
+def main() -> int:
+    """Run what the command line asks for; 0 if every benchmark ran."""
+    parser = argparse.ArgumentParser(prog="make bench ONLY=NAME", description=__doc__)
+    parser.add_argument("--only", choices=names(), metavar="NAME", help=f"one of: {', '.join(names())}")
+    chosen = parser.parse_args().only
+    failed: list[str] = []
+    for name in [chosen] if chosen else names():
+        started = time.monotonic()
+        print(f"\n== {name}", flush=True)
+        try:
+            rows = importlib.import_module(f"bench.bench_{name}").run(lambda text: print(f"   {text}", flush=True))
+        except Exception as error:  # one benchmark's failure must not hide the others' figures
+            print(f"   {name} failed: {type(error).__name__}: {error}", flush=True)
+            failed.append(name)
+            continue
+        path = harness.write(name, rows)
+        print(harness.table(rows))
+        print(f"   {time.monotonic() - started:.0f} s, written to {path.relative_to(harness.OUT_DIR.parent.parent)}")
+    if failed:
+        print(f"\nfailed: {', '.join(failed)}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

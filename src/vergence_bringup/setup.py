@@ -1,0 +1,23 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="vergence_bringup",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/vergence_bringup"]),
+        ("share/vergence_bringup", ["package.xml"]),
+    ],
+    package_data={"vergence_bringup": ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Vergence maintainers",
+    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    description="Launch files, URDF, the vergence command line, demo and report.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "vergence = vergence_bringup.command_line:main",
+        ]
+    },
+)

@@ -1,0 +1,1 @@
+"""Launch files, URDF, the vergence command line, demo and report."""

@@ -1,0 +1,24 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="vergence_camera",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/vergence_camera"]),
+        ("share/vergence_camera", ["package.xml"]),
+    ],
+    package_data={"vergence_camera": ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Vergence maintainers",
+    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    description="One USB webcam to topics; two instances make the pair.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "camera_node = vergence_camera.camera_node:main",
+            "list_cameras = vergence_camera.list_cameras:main",
+        ]
+    },
+)

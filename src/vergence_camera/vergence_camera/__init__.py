@@ -1,0 +1,1 @@
+"""One USB webcam to topics; two instances make the pair."""

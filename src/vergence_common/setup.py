@@ -1,0 +1,18 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="vergence_common",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/vergence_common"]),
+        ("share/vergence_common", ["package.xml"]),
+    ],
+    package_data={"vergence_common": ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Vergence maintainers",
+    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    description="The ROS rim written once: images, parameters, diagnostics, QoS, node main.",
+    license="Apache-2.0",
+)

@@ -1,0 +1,1 @@
+"""The ROS rim written once: images, parameters, diagnostics, QoS, node main."""

@@ -1,0 +1,24 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="vergence_metric",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/vergence_metric"]),
+        ("share/vergence_metric", ["package.xml"]),
+    ],
+    package_data={"vergence_metric": ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Vergence maintainers",
+    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    description="Synchronised pairs to vergence metrics, signed disparity and the class-free tracker.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "edge_metric_node = vergence_metric.edge_metric_node:main",
+            "box_metric_node = vergence_metric.box_metric_node:main",
+        ]
+    },
+)

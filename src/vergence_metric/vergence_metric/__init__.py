@@ -1,0 +1,1 @@
+"""Synchronised pairs to vergence metrics, signed disparity and the class-free tracker."""

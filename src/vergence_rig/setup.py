@@ -1,0 +1,18 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="vergence_rig",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/vergence_rig"]),
+        ("share/vergence_rig", ["package.xml"]),
+    ],
+    package_data={"vergence_rig": ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Vergence maintainers",
+    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    description="The rig in pure Python: its description, geometry, cameras and servo plants. No ROS in it.",
+    license="Apache-2.0",
+)

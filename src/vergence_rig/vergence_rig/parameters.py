@@ -1,0 +1,172 @@
+"""Parameter sets as frozen dataclasses that describe and validate themselves.
+
+One declaration serves the pure code (a plain dataclass), the ROS rim (type, unit, range and description for the
+parameter descriptors) and the shipped YAML (a test holds it equal to the defaults)::
+
+    @dataclass(frozen=True)
+    class EdgeParameters(Parameters):
+        blur_sigma_px: float = parameter(1.4, "Gaussian blur before Canny", unit="px", minimum=0.0, maximum=10.0)
+        device: str = parameter(REQUIRED, "which camera", read_only=True)
+
+        def check(self) -> None:
+            if ...: raise ParameterError("blur_sigma_px", self.blur_sigma_px, "less than half of ...")
+"""
+
+import dataclasses
+import math
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+_KEY = "vergence_parameter"
+
+
+class _Required:
+    def __repr__(self) -> str:
+        return "REQUIRED"
+
+
+REQUIRED: Any = _Required()
+"""Default of a parameter that has no sensible one: the user must give it."""
+
+
+class ParameterError(ValueError):
+    """A parameter that cannot be: names it, the value and what is allowed."""
+
+    def __init__(self, name: str, value: object, allowed: str) -> None:
+        super().__init__(f"parameter '{name}' is {value!r}: allowed is {allowed}")
+        self.name, self.value, self.allowed = name, value, allowed
+
+
+@dataclass(frozen=True)
+class ParameterSpec:
+    """What is known of one parameter beside its value.
+
+    `kind` is bool, int, float or str, `is_list` says that the value is a tuple of them. `minimum` and `maximum` are
+    inclusive and hold for every element of a list; `choices` lists the allowed strings.
+    """
+
+    name: str
+    kind: type
+    is_list: bool
+    default: Any
+    description: str
+    unit: str
+    minimum: float | None
+    maximum: float | None
+    choices: tuple[str, ...] | None
+    read_only: bool
+
+    @property
+    def required(self) -> bool:
+        """True if the user must give a value."""
+        return self.default is REQUIRED
+
+    @property
+    def allowed(self) -> str:
+        """What is allowed, in words."""
+        noun = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}[self.kind]
+        if self.choices is not None:
+            noun = "one of " + ", ".join(repr(choice) for choice in self.choices)
+        elif self.minimum is not None and self.maximum is not None:
+            noun += f" from {self.minimum:g} to {self.maximum:g}"
+        elif self.minimum is not None:
+            noun += f" of at least {self.minimum:g}"
+        elif self.maximum is not None:
+            noun += f" of at most {self.maximum:g}"
+        if self.unit:
+            noun += f" [{self.unit}]"
+        return f"a list, each {noun}" if self.is_list else noun
+
+    def normalised(self, value: Any) -> Any:
+        """Return `value` in the parameter's own type (lists as tuples); raise ParameterError if it cannot be."""
+        if not self.is_list:
+            return self._normalised_element(value, value)
+        if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
+            raise ParameterError(self.name, value, self.allowed)
+        return tuple(self._normalised_element(element, value) for element in value)
+
+    def _normalised_element(self, element: Any, whole: Any) -> Any:
+        if self.kind is float and isinstance(element, int) and not isinstance(element, bool):
+            element = float(element)
+        if type(element) is not self.kind:
+            raise ParameterError(self.name, whole, self.allowed)
+        if self.kind is float and not math.isfinite(element):
+            raise ParameterError(self.name, whole, self.allowed)
+        if self.choices is not None and element not in self.choices:
+            raise ParameterError(self.name, whole, self.allowed)
+        if (self.minimum is not None and element < self.minimum) or (
+            self.maximum is not None and element > self.maximum
+        ):
+            raise ParameterError(self.name, whole, self.allowed)
+        return element
+
+
+def parameter(
+    default: Any,
+    description: str,
+    *,
+    unit: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    choices: tuple[str, ...] | None = None,
+    read_only: bool = False,
+) -> Any:
+    """Return a dataclass field that carries a parameter's description; see the module's docstring."""
+    metadata = {
+        _KEY: {
+            "description": description,
+            "unit": unit,
+            "minimum": minimum,
+            "maximum": maximum,
+            "choices": choices,
+            "read_only": read_only,
+        }
+    }
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+Self = TypeVar("Self", bound="Parameters")
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """A validated set of parameters. Subclasses are frozen dataclasses whose fields are made by `parameter`."""
+
+    def __post_init__(self) -> None:
+        for spec in self.specs():
+            value = getattr(self, spec.name)
+            if value is REQUIRED:
+                raise ParameterError(spec.name, None, f"{spec.allowed}, and it must be given")
+            object.__setattr__(self, spec.name, spec.normalised(value))
+        self.check()
+
+    def check(self) -> None:
+        """Raise ParameterError where two parameters do not fit together; the base has nothing to check."""
+
+    @classmethod
+    def specs(cls) -> tuple[ParameterSpec, ...]:
+        """Return the specification of every field, in order of declaration."""
+        hints = typing.get_type_hints(cls)
+        specs = []
+        for field in dataclasses.fields(cls):
+            kind, is_list = hints[field.name], False
+            if typing.get_origin(kind) is tuple:
+                kind, is_list = typing.get_args(kind)[0], True
+            specs.append(ParameterSpec(field.name, kind, is_list, field.default, **field.metadata[_KEY]))
+        return tuple(specs)
+
+    @classmethod
+    def from_mapping(cls: type[Self], values: Mapping[str, Any]) -> Self:
+        """Build the set from names and values; unknown names raise ParameterError."""
+        known = {spec.name for spec in cls.specs()}
+        for name, value in values.items():
+            if name not in known:
+                raise ParameterError(name, value, f"no such parameter; there are {', '.join(sorted(known))}")
+        return cls(**values)
+
+    def replaced(self: Self, **changes: Any) -> Self:
+        """Return a validated copy with some values changed; unknown names raise ParameterError."""
+        current = {spec.name: getattr(self, spec.name) for spec in self.specs()}
+        return type(self).from_mapping(current | changes)

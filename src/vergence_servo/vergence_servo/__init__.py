@@ -1,0 +1,1 @@
+"""Metrics to servos: the gaze control law and the servo drivers."""

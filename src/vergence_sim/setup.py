@@ -1,0 +1,23 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="vergence_sim",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/vergence_sim"]),
+        ("share/vergence_sim", ["package.xml"]),
+    ],
+    package_data={"vergence_sim": ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Vergence maintainers",
+    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    description="A binocular head in a furnished room, on MuJoCo: stands in for cameras, servos and world.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "sim_node = vergence_sim.sim_node:main",
+        ]
+    },
+)
