@@ -32,9 +32,7 @@ def write(name: str, rows: Iterable[Row], out_dir: Path = OUT_DIR) -> Path:
     """Write the rows of benchmark `name` to `<out_dir>/<name>.json` and return that path."""
     out_dir.mkdir(parents=True, exist_ok=True)
     path = out_dir / f"{name}.json"
-    records = [
-        asdict(row) | {"value": _finite(row.value), "against_value": _finite(row.against_value)} for row in rows
-    ]
+    records = [asdict(row) | {"value": _finite(row.value), "against_value": _finite(row.against_value)} for row in rows]
     path.write_text(json.dumps(records, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return path
 
@@ -45,7 +43,9 @@ def table(rows: Iterable[Row]) -> str:
     for row in rows:
         lines.append((row.what, _figure(row.value), row.unit, row.against or "", _figure(row.against_value)))
     widths = [max(len(line[i]) for line in lines) for i in range(5)]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip() for line in lines)
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines
+    )
 
 
 def _figure(value: float | None) -> str:

@@ -15,7 +15,7 @@ parameter descriptors) and the shipped YAML (a test holds it equal to the defaul
 import dataclasses
 import math
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -37,6 +37,13 @@ class ParameterError(ValueError):
     def __init__(self, name: str, value: object, allowed: str) -> None:
         super().__init__(f"parameter '{name}' is {value!r}: allowed is {allowed}")
         self.name, self.value, self.allowed = name, value, allowed
+
+
+class UnknownParameterError(ParameterError):
+    """A parameter that nobody declares."""
+
+    def __init__(self, name: str, value: object, known: Iterable[str]) -> None:
+        super().__init__(name, value, "no such name, only " + ", ".join(sorted(known)))
 
 
 @dataclass(frozen=True)
@@ -90,16 +97,16 @@ class ParameterSpec:
     def _normalised_element(self, element: Any, whole: Any) -> Any:
         if self.kind is float and isinstance(element, int) and not isinstance(element, bool):
             element = float(element)
-        if type(element) is not self.kind:
+        if type(element) is not self.kind:  # not isinstance: True must not pass for a whole number
             raise ParameterError(self.name, whole, self.allowed)
-        if self.kind is float and not math.isfinite(element):
+        if isinstance(element, float) and not math.isfinite(element):
             raise ParameterError(self.name, whole, self.allowed)
         if self.choices is not None and element not in self.choices:
             raise ParameterError(self.name, whole, self.allowed)
-        if (self.minimum is not None and element < self.minimum) or (
-            self.maximum is not None and element > self.maximum
-        ):
-            raise ParameterError(self.name, whole, self.allowed)
+        if isinstance(element, (int, float)):
+            low, high = self.minimum, self.maximum
+            if (low is not None and element < low) or (high is not None and element > high):
+                raise ParameterError(self.name, whole, self.allowed)
         return element
 
 
@@ -163,7 +170,7 @@ class Parameters:
         known = {spec.name for spec in cls.specs()}
         for name, value in values.items():
             if name not in known:
-                raise ParameterError(name, value, f"no such parameter; there are {', '.join(sorted(known))}")
+                raise UnknownParameterError(name, value, known)
         return cls(**values)
 
     def replaced(self: Self, **changes: Any) -> Self:

@@ -1,0 +1,63 @@
+"""A node's health on /diagnostics, once a second, from small functions that each report on one thing."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+OK, WARN, ERROR, STALE = 0, 1, 2, 3
+
+
+@dataclass(frozen=True)
+class Report:
+    """One status: level (OK, WARN, ERROR, STALE), a sentence, and figures by name."""
+
+    level: int
+    message: str
+    values: Mapping[str, object] = field(default_factory=dict)
+
+
+class Diagnostics:
+    """Publishes the reports of one node. Names are prefixed by the node's own, as `diagnostic_updater` does."""
+
+    def __init__(self, node: Node, hardware_id: str = "none", period_s: float = 1.0) -> None:
+        self._node = node
+        self._hardware_id = hardware_id
+        self._sources: dict[str, Callable[[], Report]] = {}
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._timer = node.create_timer(period_s, self.publish)
+
+    def add(self, name: str, report: Callable[[], Report]) -> None:
+        """Ask `report` for its state at every publication. A second source of one name replaces the first."""
+        self._sources[name] = report
+
+    def collect(self) -> dict[str, Report]:
+        """Return every report now; a source that fails is itself reported as an error."""
+        reports = {}
+        for name, source in self._sources.items():
+            try:
+                reports[name] = source()
+            except Exception as error:  # a report must never end the node it reports on
+                reports[name] = Report(ERROR, f"the report failed: {type(error).__name__}: {error}")
+        return reports
+
+    def publish(self) -> None:
+        """Publish all reports."""
+        message = DiagnosticArray()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.status = [self._status(name, report) for name, report in self.collect().items()]
+        self._publisher.publish(message)
+
+    def _status(self, name: str, report: Report) -> DiagnosticStatus:
+        return DiagnosticStatus(
+            level=bytes([report.level]),
+            name=f"{self._node.get_fully_qualified_name().lstrip('/')}: {name}",
+            message=report.message,
+            hardware_id=self._hardware_id,
+            values=[KeyValue(key=str(key), value=_text(value)) for key, value in report.values.items()],
+        )
+
+
+def _text(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

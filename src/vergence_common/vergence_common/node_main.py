@@ -1,0 +1,64 @@
+"""The one way in which every node starts, spins and ends."""
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+STATUS_BAD_INPUT = 2
+
+
+def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -> int:
+    """Make a node, spin it on one thread until SIGINT, SIGTERM or shutdown, close it, and return the exit status.
+
+    The node's own `close()`, where it has one, releases hardware and joins its threads. A ValueError while the node
+    is made (a wrong parameter, rig or calibration) is one line on standard error and status 2; so is a parameter file
+    that cannot be read. A clean end is status 0.
+    """
+    node: Node | None = None
+    try:
+        rclpy.init(args=list(args) if args is not None else None)
+    except KeyboardInterrupt:
+        return 0
+    except Exception as error:
+        return _bad_input(error)
+    try:
+        node = make_node()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception as error:
+        if not rclpy.ok():
+            return 0  # a signal shut the context down under us; what failed then only noticed it
+        if node is None and isinstance(error, (ValueError, OSError)):
+            return _bad_input(error)
+        raise
+    finally:
+        _close(node)
+    return 0
+
+
+def _bad_input(error: Exception) -> int:
+    text = " ".join(str(error).split()) or type(error).__name__
+    print(f"{Path(sys.argv[0]).stem}: {text}", file=sys.stderr, flush=True)
+    return STATUS_BAD_INPUT
+
+
+def _close(node: Node | None) -> None:
+    # A second Ctrl-C must not leave hardware half released.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    try:
+        if node is not None:
+            close = getattr(node, "close", None)
+            if close is not None:
+                close()
+            node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
