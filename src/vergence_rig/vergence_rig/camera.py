@@ -1,0 +1,189 @@
+"""The camera model: pixels to rays and back, lens distortion included.
+
+Pixels have their origin at the centre of the top-left pixel, x right, y down. The optical frame has z forward, x right,
+y down. Distortion is OpenCV's and ROS's: `plumb_bob` (k1 k2 p1 p2 k3), `rational_polynomial` (eight coefficients) and
+`equidistant` (fisheye, four).
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from vergence_rig.rig import CameraSpec
+
+Array = npt.NDArray[np.float64]
+
+_COEFFICIENTS = {"": (0, 4, 5), "plumb_bob": (0, 4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
+_ITERATIONS = 50
+_TOLERANCE = 1e-10
+
+
+class CameraError(ValueError):
+    """A camera description that cannot be: names the part, its value and what is allowed."""
+
+
+class CameraModel:
+    """Pixels to rays and back for one camera."""
+
+    def __init__(self, spec: "CameraSpec") -> None:
+        """Take the camera of rig.yaml."""
+        self._set(
+            spec.width_px,
+            spec.height_px,
+            (spec.fx_px, spec.fy_px, spec.cx_px, spec.cy_px),
+            spec.distortion,
+            "plumb_bob",
+        )
+
+    @classmethod
+    def from_camera_info_values(
+        cls, width: int, height: int, k: Sequence[float], d: Sequence[float], distortion_model: str = "plumb_bob"
+    ) -> "CameraModel":
+        """Build the model from the values of a sensor_msgs/CameraInfo.
+
+        `k` is the row-major 3x3 intrinsic matrix, `d` the distortion coefficients. Raises CameraError for an
+        uncalibrated camera (zero focal length) or an unknown distortion model.
+        """
+        matrix = np.asarray(k, dtype=np.float64).reshape(-1)
+        if matrix.shape != (9,):
+            raise CameraError(f"k has {matrix.size} values: allowed is 9, the row-major 3x3 intrinsic matrix")
+        model = cls.__new__(cls)
+        model._set(width, height, (matrix[0], matrix[4], matrix[2], matrix[5]), d, distortion_model)
+        return model
+
+    def _set(
+        self, width: int, height: int, intrinsics: Sequence[float], d: Sequence[float], distortion_model: str
+    ) -> None:
+        self.width_px, self.height_px = int(width), int(height)
+        self.fx_px, self.fy_px, self.cx_px, self.cy_px = (float(value) for value in intrinsics)
+        if self.width_px <= 0 or self.height_px <= 0:
+            raise CameraError(f"image size is {width} x {height}: allowed is at least 1 x 1 [px]")
+        if not (np.isfinite(intrinsics).all() and self.fx_px > 0 and self.fy_px > 0):
+            raise CameraError(
+                f"fx, fy, cx, cy are {tuple(intrinsics)}: allowed are finite values, fx and fy above 0 [px]"
+            )
+        if distortion_model not in _COEFFICIENTS:
+            known = ", ".join(repr(name) for name in _COEFFICIENTS if name)
+            raise CameraError(f"distortion_model is {distortion_model!r}: allowed is one of {known}")
+        coefficients = np.asarray(d, dtype=np.float64).reshape(-1)
+        if coefficients.size not in _COEFFICIENTS[distortion_model] or not np.isfinite(coefficients).all():
+            counts = " or ".join(str(count) for count in _COEFFICIENTS[distortion_model])
+            raise CameraError(
+                f"distortion is {coefficients.tolist()}: allowed are {counts} finite values for '{distortion_model}'"
+            )
+        self.distortion_model = distortion_model or "plumb_bob"
+        self.distortion = coefficients
+        self._is_distorted = bool(np.any(coefficients)) or self.distortion_model == "equidistant"
+        self._limit = _monotone_limit(coefficients) if self.distortion_model == "plumb_bob" else np.inf
+
+    def undistort(self, uv: Any) -> Array:
+        """Return normalised coordinates (N, 2), x/z and y/z, of raw pixels (N, 2). NaN where nothing maps there."""
+        pixels = np.atleast_2d(np.asarray(uv, dtype=np.float64))
+        distorted = (pixels - (self.cx_px, self.cy_px)) / (self.fx_px, self.fy_px)
+        if not self._is_distorted:
+            return distorted
+        normalised = distorted.copy()
+        if self.distortion_model == "equidistant":
+            normalised = _start_equidistant(distorted)
+        with np.errstate(all="ignore"):
+            for _ in range(_ITERATIONS):
+                residual = self._distort(normalised) - distorted
+                if np.nanmax(np.abs(residual), initial=0.0) < _TOLERANCE:
+                    break
+                normalised = normalised - _solve(self._jacobian(normalised), residual)
+            normalised[~(np.abs(self._distort(normalised) - distorted).max(axis=1) < 1e-6)] = np.nan
+        return normalised
+
+    def distort(self, normalised: Any) -> Array:
+        """Return raw pixels (N, 2) of normalised coordinates (N, 2). NaN where the lens model has turned back."""
+        points = np.atleast_2d(np.asarray(normalised, dtype=np.float64))
+        distorted = self._distort(points) if self._is_distorted else points
+        pixels: Array = distorted * (self.fx_px, self.fy_px) + (self.cx_px, self.cy_px)
+        if self._is_distorted and np.isfinite(self._limit):
+            pixels[np.hypot(points[:, 0], points[:, 1]) > self._limit] = np.nan
+        return pixels
+
+    def pixel_to_ray(self, uv: Any) -> Array:
+        """Return unit rays (N, 3) in the optical frame (x right, y down, z forward) of raw pixels (N, 2)."""
+        normalised = self.undistort(uv)
+        rays = np.column_stack([normalised, np.ones(len(normalised))])
+        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+    def ray_to_pixel(self, rays: Any) -> Array:
+        """Return raw pixels (N, 2) of rays or points (N, 3) in the optical frame; NaN for those not in front."""
+        points = np.atleast_2d(np.asarray(rays, dtype=np.float64))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            normalised = np.where(points[:, 2:] > 0, points[:, :2] / points[:, 2:], np.nan)
+        return self.distort(normalised)
+
+    def angles(self, uv: Any) -> Array:
+        """Return azimuth atan(x/z), right positive, and elevation atan(y/z), down positive, (N, 2) [rad]."""
+        return np.arctan(self.undistort(uv))
+
+    def contains(self, uv: Any) -> npt.NDArray[np.bool_]:
+        """Tell which pixels (N, 2) lie in the image, to its outermost pixels' edges."""
+        pixels = np.atleast_2d(np.asarray(uv, dtype=np.float64))
+        inside: npt.NDArray[np.bool_] = (
+            (pixels >= -0.5).all(axis=1)
+            & (pixels[:, 0] <= self.width_px - 0.5)
+            & (pixels[:, 1] <= self.height_px - 0.5)
+        )
+        return inside
+
+    def _distort(self, points: Array) -> Array:
+        x, y = points[:, 0], points[:, 1]
+        if self.distortion_model == "equidistant":
+            radius = np.hypot(x, y)
+            theta = np.arctan(radius)
+            square = theta * theta
+            k1, k2, k3, k4 = self.distortion
+            bent = theta * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
+            scale = np.where(radius > 1e-12, bent / np.maximum(radius, 1e-12), 1.0)
+            return np.column_stack([x * scale, y * scale])
+        k1, k2, p1, p2, k3, k4, k5, k6 = np.concatenate([self.distortion, np.zeros(8 - self.distortion.size)])
+        square = x * x + y * y
+        radial = (1 + square * (k1 + square * (k2 + square * k3))) / (1 + square * (k4 + square * (k5 + square * k6)))
+        return np.column_stack(
+            [
+                x * radial + 2 * p1 * x * y + p2 * (square + 2 * x * x),
+                y * radial + p1 * (square + 2 * y * y) + 2 * p2 * x * y,
+            ]
+        )
+
+    def _jacobian(self, points: Array) -> Array:
+        step = 1e-6
+        columns = [
+            (self._distort(points + offset) - self._distort(points - offset)) / (2 * step)
+            for offset in (np.array([step, 0.0]), np.array([0.0, step]))
+        ]
+        return np.stack(columns, axis=-1)
+
+
+def _solve(jacobian: Array, residual: Array) -> Array:
+    a, b, c, d = jacobian[:, 0, 0], jacobian[:, 0, 1], jacobian[:, 1, 0], jacobian[:, 1, 1]
+    determinant = a * d - b * c
+    return np.column_stack(
+        [
+            (d * residual[:, 0] - b * residual[:, 1]) / determinant,
+            (a * residual[:, 1] - c * residual[:, 0]) / determinant,
+        ]
+    )
+
+
+def _start_equidistant(distorted: Array) -> Array:
+    bent = np.hypot(distorted[:, 0], distorted[:, 1])
+    radius = np.tan(np.minimum(bent, 1.5))
+    return distorted * (radius / np.maximum(bent, 1e-12))[:, None]
+
+
+def _monotone_limit(coefficients: Array) -> float:
+    """Radius up to which the radial polynomial still grows: beyond it, points fold back into the image."""
+    if coefficients.size == 0 or not np.any(coefficients):
+        return np.inf
+    k1, k2, k3 = coefficients[0], coefficients[1], coefficients[4] if coefficients.size > 4 else 0.0
+    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    return float(np.sqrt(real[real > 0].min())) if np.any(real > 0) else np.inf

@@ -1,0 +1,216 @@
+"""Where two eyes look, and where they have to look.
+
+`rig_base` has x forward, y left, z up; its origin lies midway between the eyes on the tilt axis, the left eye at
++baseline/2 on y. The bar tilts first (about y, tilt > 0 looks down), then each eye pans (pan > 0 looks left): Helmholtz
+angles, so that both axes always lie in one plane. vergence = pan_right - pan_left, version is their mean.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+_PARALLEL_RAD = 1e-7
+
+
+class GeometryError(ValueError):
+    """A geometry that has no answer."""
+
+
+class ParallelAxesError(GeometryError):
+    """The two axes are parallel: they meet at infinity."""
+
+
+class DivergingAxesError(GeometryError):
+    """The two axes diverge: they would meet behind the eyes."""
+
+
+class UnreachableError(GeometryError):
+    """No pair of eye angles looks there."""
+
+
+@dataclass(frozen=True)
+class EyeAngles:
+    """The three joint angles [rad]."""
+
+    pan_left_rad: float
+    pan_right_rad: float
+    tilt_rad: float
+
+    @property
+    def version_rad(self) -> float:
+        """Mean pan of the eyes [rad]."""
+        return 0.5 * (self.pan_left_rad + self.pan_right_rad)
+
+    @property
+    def vergence_rad(self) -> float:
+        """Angle between the axes [rad], positive converges."""
+        return self.pan_right_rad - self.pan_left_rad
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the angles by joint name."""
+        return {"pan_left": self.pan_left_rad, "pan_right": self.pan_right_rad, "tilt": self.tilt_rad}
+
+
+@dataclass(frozen=True)
+class Fixation:
+    """Where two axes meet: the midpoint of their closest approach in rig_base (3,) [m] and how far they pass."""
+
+    point_m: Array
+    miss_distance_m: float
+
+    @property
+    def distance_m(self) -> float:
+        """From the midpoint between the eyes [m]."""
+        return float(np.linalg.norm(self.point_m))
+
+
+@dataclass(frozen=True)
+class PaperFixation:
+    """The paper's planar fixation point: `om_m` from the baseline's middle M, `x_m` forward, `y_m` left [m]."""
+
+    om_m: float
+    x_m: float
+    y_m: float
+    vergence_rad: float
+
+
+def from_version_vergence(version_rad: float, vergence_rad: float, tilt_rad: float) -> EyeAngles:
+    """Return the eye angles of a version, vergence and tilt [rad]."""
+    return EyeAngles(version_rad - 0.5 * vergence_rad, version_rad + 0.5 * vergence_rad, tilt_rad)
+
+
+def eye_position(left: bool, baseline_m: float) -> Array:
+    """Return an eye's centre in rig_base (3,) [m]; tilting does not move it."""
+    return np.array([0.0, 0.5 * baseline_m if left else -0.5 * baseline_m, 0.0])
+
+
+def eye_direction(pan_rad: float, tilt_rad: float) -> Array:
+    """Return the unit optical axis in rig_base (3,) of an eye at these angles [rad]."""
+    cos_pan = math.cos(pan_rad)
+    return np.array([math.cos(tilt_rad) * cos_pan, math.sin(pan_rad), -math.sin(tilt_rad) * cos_pan])
+
+
+def rotation_rig_from_eye(pan_rad: float, tilt_rad: float) -> Array:
+    """Return R_y(tilt) R_z(pan) (3, 3): its columns are the eye's x forward, y left, z up in rig_base."""
+    sin_pan, cos_pan, sin_tilt, cos_tilt = math.sin(pan_rad), math.cos(pan_rad), math.sin(tilt_rad), math.cos(tilt_rad)
+    return np.array(
+        [
+            [cos_tilt * cos_pan, -cos_tilt * sin_pan, sin_tilt],
+            [sin_pan, cos_pan, 0.0],
+            [-sin_tilt * cos_pan, sin_tilt * sin_pan, cos_tilt],
+        ]
+    )
+
+
+ROTATION_EYE_FROM_OPTICAL: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""Optical frame (x right, y down, z forward) to eye frame (x forward, y left, z up)."""
+
+
+def rotation_rig_from_optical(pan_rad: float, tilt_rad: float) -> Array:
+    """Return the rotation (3, 3) from an eye's optical frame to rig_base."""
+    return rotation_rig_from_eye(pan_rad, tilt_rad) @ ROTATION_EYE_FROM_OPTICAL
+
+
+def angles_of_direction(direction: Any) -> tuple[float, float]:
+    """Return (pan_rad, tilt_rad) of a direction (3,) in rig_base; it need not be a unit vector.
+
+    Raises UnreachableError for one along the baseline, where tilt is undefined, or one that is zero or not finite.
+    """
+    x, y, z = (float(value) for value in direction)
+    forward = math.hypot(x, z)
+    if not (math.isfinite(forward) and math.isfinite(y)) or forward <= 1e-12 * abs(y) or forward == 0.0:
+        raise UnreachableError(f"direction is ({x:g}, {y:g}, {z:g}): allowed is one that is not along the baseline")
+    return math.atan2(y, forward), math.atan2(-z, x)
+
+
+def gaze_for_point(point_m: Any, baseline_m: float) -> EyeAngles:
+    """Return the angles that turn both axes through a point (3,) in rig_base [m].
+
+    Raises UnreachableError for a point on the line through both eyes, or one that is not finite.
+    """
+    x, y, z = (float(value) for value in point_m)
+    forward = math.hypot(x, z)
+    if not (math.isfinite(forward) and math.isfinite(y)) or forward <= 1e-9:
+        raise UnreachableError(f"point is ({x:g}, {y:g}, {z:g}) m: allowed is a finite point off the baseline's line")
+    half = 0.5 * baseline_m
+    return EyeAngles(math.atan2(y - half, forward), math.atan2(y + half, forward), math.atan2(-z, x))
+
+
+def point_at(version_rad: float, vergence_rad: float, tilt_rad: float, baseline_m: float) -> Array:
+    """Return the point (3,) in rig_base [m] that both axes pass through; the inverse of `gaze_for_point`.
+
+    Raises ParallelAxesError or DivergingAxesError.
+    """
+    pan_left = version_rad - 0.5 * vergence_rad
+    pan_right = version_rad + 0.5 * vergence_rad
+    _check_converging(vergence_rad)
+    cos_left, cos_right = math.cos(pan_left), math.cos(pan_right)
+    if cos_left <= 0 or cos_right <= 0:
+        raise DivergingAxesError(f"pans are {pan_left:g} and {pan_right:g} rad: allowed is less than a quarter turn")
+    # forward * tan(pan_right) - forward * tan(pan_left) = baseline, with the difference of tangents as a product
+    forward = baseline_m * cos_left * cos_right / math.sin(vergence_rad)
+    lateral = forward * math.tan(pan_left) + 0.5 * baseline_m
+    return np.array([forward * math.cos(tilt_rad), lateral, -forward * math.sin(tilt_rad)])
+
+
+def fixation_point(eye_angles: EyeAngles, baseline_m: float) -> Fixation:
+    """Return where the axes of ideally mounted eyes meet; raises ParallelAxesError or DivergingAxesError."""
+    point_m = point_at(eye_angles.version_rad, eye_angles.vergence_rad, eye_angles.tilt_rad, baseline_m)
+    return Fixation(point_m, 0.0)
+
+
+def nearest_points_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direction_b: Any) -> tuple[Array, Array]:
+    """Return the points (3,), (3,) of two rays that are closest to each other.
+
+    Real mounts are never square, so real gaze rays pass each other. Origins (3,) [m], directions (3,), any length.
+    Raises ParallelAxesError, or DivergingAxesError where the closest approach lies behind either origin.
+    """
+    a, b = np.asarray(origin_a, dtype=np.float64), np.asarray(origin_b, dtype=np.float64)
+    u = np.asarray(direction_a, dtype=np.float64) / np.linalg.norm(direction_a)
+    v = np.asarray(direction_b, dtype=np.float64) / np.linalg.norm(direction_b)
+    normal = np.cross(u, v)
+    sine_square = float(normal @ normal)
+    if sine_square < _PARALLEL_RAD**2:
+        raise ParallelAxesError(f"the rays are parallel to {math.sqrt(sine_square):.1e} rad: they meet at infinity")
+    offset = b - a
+    along_a = float(np.cross(offset, v) @ normal) / sine_square
+    along_b = float(np.cross(offset, u) @ normal) / sine_square
+    if along_a <= 0 or along_b <= 0:
+        raise DivergingAxesError("the rays diverge: their closest approach is behind an eye")
+    return a + along_a * u, b + along_b * v
+
+
+def fixation_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direction_b: Any) -> Fixation:
+    """Return the midpoint of the closest approach of two rays, and their miss distance; raises as the above."""
+    nearest_a, nearest_b = nearest_points_of_rays(origin_a, direction_a, origin_b, direction_b)
+    return Fixation(0.5 * (nearest_a + nearest_b), float(np.linalg.norm(nearest_b - nearest_a)))
+
+
+def paper_fixation(c1_rad: float, c2_rad: float, baseline_m: float) -> PaperFixation:
+    """Return the fixation point from the paper's baseline angles [rad].
+
+    C1 and C2 are the interior angles of the triangle of both eyes and the fixation point: C1 = 90 deg + pan_left,
+    C2 = 90 deg - pan_right. At equal angles OM = d/2 tan C. Raises ParallelAxesError or DivergingAxesError.
+    """
+    for name, angle in (("c1_rad", c1_rad), ("c2_rad", c2_rad)):
+        if not 0.0 < angle < math.pi:
+            raise GeometryError(f"{name} is {angle!r}: allowed is an angle between 0 and pi [rad]")
+    vergence_rad = math.pi - c1_rad - c2_rad
+    _check_converging(vergence_rad)
+    forward = baseline_m * math.sin(c1_rad) * math.sin(c2_rad) / math.sin(c1_rad + c2_rad)
+    lateral = 0.5 * baseline_m - forward * math.cos(c1_rad) / math.sin(c1_rad)
+    return PaperFixation(math.hypot(forward, lateral), forward, lateral, vergence_rad)
+
+
+def _check_converging(vergence_rad: float) -> None:
+    if not math.isfinite(vergence_rad):
+        raise GeometryError(f"vergence is {vergence_rad!r}: allowed is a finite angle [rad]")
+    if abs(vergence_rad) < _PARALLEL_RAD:
+        raise ParallelAxesError(f"vergence is {vergence_rad:.1e} rad: the axes are parallel and meet at infinity")
+    if vergence_rad < 0:
+        raise DivergingAxesError(f"vergence is {vergence_rad:g} rad: the axes diverge")

@@ -1,0 +1,239 @@
+"""The rig: baseline, cameras, joints and limits, as rig.yaml describes them.
+
+Every part is a frozen dataclass that validates itself; errors name the key, the value and what is allowed.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+
+from vergence_rig.parameters import ParameterError, Parameters, parameter
+from vergence_rig.servo import MG995, PRESETS, SG90, ServoSpec
+
+JOINT_NAMES = ("pan_left", "pan_right", "tilt")
+"""The three joints, in the order that commands carry them."""
+
+_DEG = math.pi / 180.0
+
+
+class RigError(ValueError):
+    """A rig description that cannot be: names the key, the value and what is allowed."""
+
+
+@dataclass(frozen=True)
+class CameraSpec(Parameters):
+    """One camera: image size, intrinsics and `plumb_bob` distortion (k1 k2 p1 p2 k3)."""
+
+    width_px: int = parameter(640, "image width", unit="px", minimum=16, maximum=16384)
+    height_px: int = parameter(480, "image height", unit="px", minimum=16, maximum=16384)
+    fx_px: float = parameter(539.0, "focal length along x", unit="px", minimum=1, maximum=1e5)
+    fy_px: float = parameter(539.0, "focal length along y", unit="px", minimum=1, maximum=1e5)
+    cx_px: float = parameter(319.5, "principal point, x", unit="px", minimum=-1e5, maximum=1e5)
+    cy_px: float = parameter(239.5, "principal point, y", unit="px", minimum=-1e5, maximum=1e5)
+    distortion: tuple[float, ...] = parameter((0.0, 0.0, 0.0, 0.0, 0.0), "k1 k2 p1 p2 k3", minimum=-100, maximum=100)
+
+    def check(self) -> None:
+        """Hold the number of coefficients to five."""
+        if len(self.distortion) != 5:
+            raise ParameterError("distortion", self.distortion, "a list of five numbers: k1 k2 p1 p2 k3")
+
+
+@dataclass(frozen=True)
+class JointSpec:
+    """One joint: where it may go, how fast it may be commanded, and the servo that turns it."""
+
+    lower_rad: float
+    upper_rad: float
+    max_speed_rad_s: float
+    servo: ServoSpec
+
+    def __post_init__(self) -> None:
+        half_turn = math.pi
+        _check_number("lower_rad", self.lower_rad, -half_turn, half_turn, "rad")
+        _check_number("upper_rad", self.upper_rad, -half_turn, half_turn, "rad")
+        _check_number("max_speed_rad_s", self.max_speed_rad_s, 1e-3, 1e3, "rad/s")
+        if self.lower_rad >= self.upper_rad:
+            raise RigError(f"upper_rad is {self.upper_rad!r}: allowed is more than lower_rad, {self.lower_rad!r} [rad]")
+
+    def clamp(self, angle_rad: float) -> float:
+        """Return the angle [rad] held within the joint's limits."""
+        return min(max(angle_rad, self.lower_rad), self.upper_rad)
+
+    @property
+    def speed_rad_s(self) -> float:
+        """The speed that both the limit and the servo allow [rad/s]."""
+        return min(self.max_speed_rad_s, self.servo.speed_rad_s)
+
+
+def _pan(servo: ServoSpec = SG90) -> JointSpec:
+    return JointSpec(-60.0 * _DEG, 60.0 * _DEG, 600.0 * _DEG, servo)
+
+
+def _tilt(servo: ServoSpec = MG995) -> JointSpec:
+    return JointSpec(-45.0 * _DEG, 45.0 * _DEG, 300.0 * _DEG, servo)
+
+
+@dataclass(frozen=True)
+class Joints:
+    """The three joints: two pan servos on top of a tilt bar."""
+
+    pan_left: JointSpec = field(default_factory=_pan)
+    pan_right: JointSpec = field(default_factory=_pan)
+    tilt: JointSpec = field(default_factory=_tilt)
+
+    def __getitem__(self, name: str) -> JointSpec:
+        if name not in JOINT_NAMES:
+            raise KeyError(name)
+        spec: JointSpec = getattr(self, name)
+        return spec
+
+    def items(self) -> tuple[tuple[str, JointSpec], ...]:
+        """Return (name, joint) in the order of JOINT_NAMES."""
+        return tuple((name, self[name]) for name in JOINT_NAMES)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A binocular head: eyes at +-baseline_m / 2 on the y axis of `rig_base`, on top of one tilt bar."""
+
+    baseline_m: float = 0.065
+    left_camera: CameraSpec = field(default_factory=CameraSpec)
+    right_camera: CameraSpec = field(default_factory=CameraSpec)
+    joints: Joints = field(default_factory=Joints)
+    minimum_vergence_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_number("baseline_m", self.baseline_m, 1e-3, 10.0, "m")
+        _check_number("minimum_vergence_rad", self.minimum_vergence_rad, 0.0, 0.5 * math.pi, "rad")
+        widest_rad = self.pan_right.upper_rad - self.pan_left.lower_rad
+        if self.minimum_vergence_rad >= widest_rad:
+            raise RigError(
+                f"minimum_vergence_rad is {self.minimum_vergence_rad!r}: "
+                f"allowed is less than the pan joints can reach, {widest_rad:g} [rad]"
+            )
+
+    @property
+    def pan_left(self) -> JointSpec:
+        """The left eye's pan joint."""
+        return self.joints.pan_left
+
+    @property
+    def pan_right(self) -> JointSpec:
+        """The right eye's pan joint."""
+        return self.joints.pan_right
+
+    @property
+    def tilt(self) -> JointSpec:
+        """The joint of the bar that carries both eyes."""
+        return self.joints.tilt
+
+    def with_servos(self, pan: ServoSpec, tilt: ServoSpec | None = None) -> "Rig":
+        """Return the same rig with other servos (`tilt`: the pans' if not given) and speed limits to match."""
+        tilt = pan if tilt is None else tilt
+        return Rig(
+            self.baseline_m,
+            self.left_camera,
+            self.right_camera,
+            Joints(
+                *(
+                    JointSpec(joint.lower_rad, joint.upper_rad, servo.speed_rad_s, servo)
+                    for joint, servo in ((self.pan_left, pan), (self.pan_right, pan), (self.tilt, tilt))
+                )
+            ),
+            self.minimum_vergence_rad,
+        )
+
+
+def default_rig() -> Rig:
+    """Return the built-in rig, equal to config/rig.yaml."""
+    return Rig()
+
+
+def load_rig(path: str | Path) -> Rig:
+    """Read a rig from YAML; "" gives the built-in one. Raises RigError naming file, key, value and what is allowed."""
+    if str(path) == "":
+        return default_rig()
+    try:
+        document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RigError(f"rig file '{path}' cannot be read: {error.strerror or error}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise RigError(f"rig file '{path}' is not YAML: {' '.join(str(error).split())}") from error
+    try:
+        return rig_from_mapping(document)
+    except RigError as error:
+        raise RigError(f"rig file '{path}': {error}") from error
+
+
+def rig_from_mapping(document: Any) -> Rig:
+    """Build a rig from nested mappings as in rig.yaml; what is left out keeps its default. Raises RigError."""
+    top = _mapping("rig", document, ("baseline_m", "left_camera", "right_camera", "joints", "minimum_vergence_rad"))
+    joints = _mapping("joints", top.get("joints", {}), JOINT_NAMES)
+    default = default_rig()
+    return Rig(
+        baseline_m=_number(top, "baseline_m", default.baseline_m),
+        left_camera=_parameters("left_camera", CameraSpec(), top.get("left_camera", {})),
+        right_camera=_parameters("right_camera", CameraSpec(), top.get("right_camera", {})),
+        joints=Joints(*(_joint(f"joints.{name}", default.joints[name], joints.get(name, {})) for name in JOINT_NAMES)),
+        minimum_vergence_rad=_number(top, "minimum_vergence_rad", default.minimum_vergence_rad),
+    )
+
+
+def _joint(key: str, default: JointSpec, value: Any) -> JointSpec:
+    entries = _mapping(key, value, ("lower_rad", "upper_rad", "max_speed_rad_s", "servo"))
+    try:
+        return JointSpec(
+            _number(entries, "lower_rad", default.lower_rad),
+            _number(entries, "upper_rad", default.upper_rad),
+            _number(entries, "max_speed_rad_s", default.max_speed_rad_s),
+            _servo(entries.get("servo", default.servo)),
+        )
+    except RigError as error:
+        raise RigError(f"{key}.{error}") from error
+
+
+def _servo(value: Any) -> ServoSpec:
+    if isinstance(value, ServoSpec):
+        return value
+    if isinstance(value, str):
+        if value not in PRESETS:
+            known = ", ".join(repr(name) for name in PRESETS)
+            raise RigError(f"servo is {value!r}: allowed is one of {known}, or a mapping of its figures")
+        return PRESETS[value]
+    return _parameters("servo", ServoSpec(), value)
+
+
+Spec = TypeVar("Spec", bound=Parameters)
+
+
+def _parameters(key: str, default: Spec, value: Any) -> Spec:
+    entries = _mapping(key, value, tuple(spec.name for spec in default.specs()))
+    try:
+        return default.replaced(**entries)
+    except ParameterError as error:
+        raise RigError(f"{key}.{error.name} is {error.value!r}: allowed is {error.allowed}") from error
+
+
+def _mapping(key: str, value: Any, allowed: tuple[str, ...]) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise RigError(f"{key} is {value!r}: allowed is a mapping with any of {', '.join(allowed)}")
+    for name in value:
+        if name not in allowed:
+            raise RigError(f"{key} has the key {name!r}: allowed are {', '.join(allowed)}")
+    return value
+
+
+def _number(entries: Mapping[str, Any], key: str, default: float) -> float:
+    value = entries.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise RigError(f"{key} is {value!r}: allowed is a number")
+    return float(value)
+
+
+def _check_number(key: str, value: float, minimum: float, maximum: float, unit: str) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not minimum <= value <= maximum:
+        raise RigError(f"{key} is {value!r}: allowed is a number from {minimum:g} to {maximum:g} [{unit}]")
