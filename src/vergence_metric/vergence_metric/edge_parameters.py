@@ -1,0 +1,51 @@
+"""Parameters of the edge metric; the node composes them with those of its pairer and its disparity estimator."""
+
+from dataclasses import dataclass
+
+from vergence_rig.parameters import ParameterError, Parameters, parameter
+
+EDGE_METHODS = ("auto", "fixed")
+ALIGN_MODES = ("none", "calibrated", "auto")
+
+
+@dataclass(frozen=True)
+class EdgeMetricParameters(Parameters):
+    """What the edge metric can be told; defaults equal config/edge_metric_node.yaml."""
+
+    windows_px: tuple[int, ...] = parameter(
+        (50, 100, 150, 200, 250, 300), "sides of the centre windows", unit="px", minimum=1, maximum=8192
+    )
+    blur_sigma_px: float = parameter(
+        1.4, "Gaussian blur before the edge detector; 0 is none", unit="px", minimum=0.0, maximum=10.0
+    )
+    edge_method: str = parameter(
+        "auto", "where Canny's thresholds come from: the image's own gradients, or as given", choices=EDGE_METHODS
+    )
+    canny_low: float = parameter(
+        20.0, "lower gradient threshold of edge_method fixed", unit="grey levels", minimum=0.0, maximum=4000.0
+    )
+    canny_high: float = parameter(
+        50.0, "upper gradient threshold of edge_method fixed", unit="grey levels", minimum=0.0, maximum=4000.0
+    )
+    auto_edge_share: float = parameter(
+        0.10, "edge_method auto: share of pixels whose gradient passes the upper threshold", minimum=0.001, maximum=0.5
+    )
+    auto_low_ratio: float = parameter(
+        0.4, "edge_method auto: lower threshold over the upper one", minimum=0.05, maximum=1.0
+    )
+    auto_floor: float = parameter(
+        20.0,
+        "edge_method auto: the upper threshold never falls below this, so that a blank wall has no edges",
+        unit="grey levels",
+        minimum=0.0,
+        maximum=4000.0,
+    )
+
+    def check(self) -> None:
+        """Raise ParameterError where two parameters do not fit together."""
+        if not self.windows_px:
+            raise ParameterError("windows_px", self.windows_px, "at least one window")
+        if len(set(self.windows_px)) != len(self.windows_px):
+            raise ParameterError("windows_px", self.windows_px, "windows that differ from one another")
+        if self.canny_low > self.canny_high:
+            raise ParameterError("canny_low", self.canny_low, f"at most canny_high ({self.canny_high:g})")

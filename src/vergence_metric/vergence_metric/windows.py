@@ -1,0 +1,58 @@
+"""Centre windows: the squares around the principal point in which the paper measures vergence."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+class WindowError(ValueError):
+    """A window or an image without extent."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """A centre window of one image, cut to the image: rows `top` to `bottom`, columns `left` to `right`, half open.
+
+    `size_px` is the side that was asked for; `clipped` says that the image is smaller than that in one direction.
+    """
+
+    size_px: int
+    top: int
+    left: int
+    bottom: int
+    right: int
+
+    @property
+    def height(self) -> int:
+        """Rows inside the image."""
+        return self.bottom - self.top
+
+    @property
+    def width(self) -> int:
+        """Columns inside the image."""
+        return self.right - self.left
+
+    @property
+    def clipped(self) -> bool:
+        """True where the image ends before the window does."""
+        return self.height < self.size_px or self.width < self.size_px
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Rows and columns, to index an image with."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
+
+
+def centre_window(size_px: int, height_px: int, width_px: int) -> Window:
+    """Return the window of side `size_px` that starts at row h//2 - s//2, column w//2 - s//2, cut to the image.
+
+    Raises WindowError where the window or the image has no extent.
+    """
+    if size_px < 1 or height_px < 1 or width_px < 1:
+        raise WindowError(f"window of {size_px} px in an image of {width_px}x{height_px}: each must be at least 1")
+    top, left = height_px // 2 - size_px // 2, width_px // 2 - size_px // 2
+    return Window(size_px, max(top, 0), max(left, 0), min(top + size_px, height_px), min(left + size_px, width_px))
+
+
+def centre_windows(sizes_px: Iterable[int], height_px: int, width_px: int) -> tuple[Window, ...]:
+    """Return one centre window per size, in the order given; raises WindowError as `centre_window` does."""
+    return tuple(centre_window(size_px, height_px, width_px) for size_px in sizes_px)
