@@ -1,3 +1,5 @@
+from glob import glob
+
 from setuptools import find_packages, setup
 
 setup(
@@ -7,6 +9,10 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/vergence_bringup"]),
         ("share/vergence_bringup", ["package.xml"]),
+        # config/ is a link to the repository's own, so that an installed workspace carries the shipped YAML files.
+        ("share/vergence_bringup/config", [path for path in glob("config/*") if not path.endswith("~")]),
+        ("share/vergence_bringup/launch", glob("launch/*.launch.py")),
+        ("share/vergence_bringup/urdf", glob("urdf/*")),
     ],
     package_data={"vergence_bringup": ["py.typed"]},
     install_requires=["setuptools"],

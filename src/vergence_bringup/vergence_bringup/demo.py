@@ -1,0 +1,120 @@
+"""`vergence demo`: every node as its own process, the simulated head, and a report of what it did."""
+
+import argparse
+import math
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+
+import numpy as np
+
+from vergence_bringup.demo_report import write_report
+from vergence_bringup.demo_result import StationResult, table, write_summary
+from vergence_bringup.demo_stations import Station, stations
+from vergence_bringup.processes import NodeCommand, ProcessGroup, config_dir, environment
+from vergence_rig.rig import Rig, load_rig
+
+SERVOS = ("sg90", "mg995", "ideal")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the subcommand."""
+    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="where the report goes (default: out/demo)")
+    parser.add_argument("--short", action="store_true", help="three stations instead of seven")
+    parser.add_argument("--ideal", action="store_true", help="ideal servos and cameras instead of realistic ones")
+    parser.add_argument("--station", action="append", metavar="NAME", help="only this station (may be repeated)")
+    parser.add_argument("--seed", type=int, default=0, help="of the simulator's noise and world (default: 0)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the demo; 0 only if at every station the graph said verged and the simulator's truth agrees."""
+    rig = load_rig(config_dir() / "rig.yaml")
+    chosen = stations(rig.baseline_m, options.short)
+    if options.station:
+        known = {station.name: station for station in stations(rig.baseline_m)}
+        for name in options.station:
+            if name not in known:
+                raise ValueError(f"--station is {name!r}: allowed is one of {', '.join(known)}")
+        chosen = [known[name] for name in options.station]
+
+    signal.signal(signal.SIGTERM, _interrupt)
+    os.environ.update(environment())
+    started = time.monotonic()
+    results: list[StationResult] = []
+    _say(f"starting sim_node, edge_metric_node and gaze_controller_node (logs in {options.out / 'log'})")
+    with ProcessGroup(log_dir=options.out / "log") as processes:
+        for name, command in _commands(options).items():
+            processes.start(name, command)
+        _run_stations(options, rig, chosen, processes.check, results)
+        _say("stopping the nodes")
+        statuses = processes.stop()
+    for name, status in statuses.items():
+        if status != 0:
+            _say(f"{name} ended with status {status}: see {options.out / 'log' / name}.log")
+
+    settings = {
+        "servo": "ideal" if options.ideal else "sg90",
+        "cameras": "ideal" if options.ideal else "realistic",
+        "duration_s": round(time.monotonic() - started, 1),
+    }
+    write_summary(options.out / "summary.json", results, settings)
+    write_report(options.out / "report.html", results, settings, options.out)
+    print()
+    print(table(results))
+    passed = sum(result.passed for result in results)
+    print(f"\n{passed} of {len(results)} stations verged, by the graph's word and by the simulator's truth")
+    print(f"report: {options.out / 'report.html'}   figures: {options.out / 'summary.json'}")
+    return 0 if results and passed == len(results) and not any(statuses.values()) else 1
+
+
+def _run_stations(
+    options: argparse.Namespace,
+    rig: Rig,
+    chosen: list[Station],
+    alive: Callable[[], None],
+    results: list[StationResult],
+) -> None:
+    # Imported late: rclpy reads the middleware's environment when it is loaded.
+    from vergence_bringup.demo_recorder import Recorder
+    from vergence_bringup.demo_run import StationRunner, tolerance_deg
+
+    recorder = Recorder()
+    try:
+        runner = StationRunner(recorder, alive, rig, tolerance_deg(rig, options.ideal), options.out)
+        _say("waiting for images, metric and controller")
+        runner.wait_until_ready()
+        for number, station in enumerate(chosen, 1):
+            _say(f"station {number} of {len(chosen)}: {station.name}: {station.title}")
+            result = runner.visit(station)
+            results.append(result)
+            verdict = "verged" if result.said_verged else f"NOT verged ({result.reason})"
+            truth = "agrees" if result.truth_agrees else "DISAGREES"
+            took = f" after {result.time_s:.2f} s" if math.isfinite(result.time_s) else ""
+            error = f"{result.true_error_deg:.2f}" if np.isfinite(result.true_error_deg) else "unknown"
+            _say(f"   graph: {verdict}{took}; truth {truth}: vergence error {error} degree")
+    finally:
+        recorder.close()
+
+
+def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
+    rig = str(config_dir() / "rig.yaml")
+    sim: dict[str, object] = {"rig": rig, "seed": options.seed}
+    if options.ideal:
+        sim["preset"] = "ideal"
+    return {
+        "sim_node": NodeCommand("vergence_sim", "sim_node", sim),
+        "edge_metric_node": NodeCommand("vergence_metric", "edge_metric_node", {"rig": rig}),
+        "gaze_controller_node": NodeCommand("vergence_servo", "gaze_controller_node", {"rig": rig}),
+    }
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _say(text: str) -> None:
+    print(f"\033[1m[demo]\033[0m {text}" if sys.stdout.isatty() else f"[demo] {text}", flush=True)

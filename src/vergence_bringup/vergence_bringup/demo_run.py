@@ -1,0 +1,216 @@
+"""One station of the demo: place the target, click on it, watch the eyes, compare with the truth."""
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PointStamped
+
+from vergence_bringup.demo_recorder import GraphError, Recorder, Stamped, StereoPicture
+from vergence_bringup.demo_result import Floats, MetricTable, Series, StationResult
+from vergence_bringup.demo_stations import Station
+from vergence_bringup.pictures import combined_edges, with_cross, with_windows, write_image
+from vergence_common.stamps import to_nanoseconds
+from vergence_metric.edge_metric import EdgeMetric
+from vergence_metric.edge_parameters import EdgeMetricParameters
+from vergence_msgs.action import LookAt
+from vergence_msgs.msg import EdgeVergence
+from vergence_rig.rig import Rig
+
+# The target point must end inside the 50 px fovea of both eyes.
+_FOVEA_HALF_PX = 25.0
+_LIMIT_S = 12.0
+_SETTLE_S = 0.7
+
+
+def tolerance_deg(rig: Rig, ideal: bool) -> float:
+    """Return what the true vergence error may be: the servos' dead band, 0.1 degree where they have none."""
+    return 0.1 if ideal else math.degrees(rig.pan_left.servo.dead_band_rad)
+
+
+class StationRunner:
+    """Visits stations one after the other; `alive` raises when a node has died."""
+
+    def __init__(
+        self, recorder: Recorder, alive: Callable[[], None], rig: Rig, tolerance_deg: float, out_dir: Path
+    ) -> None:
+        self._recorder = recorder
+        self._alive = alive
+        self._rig = rig
+        self._tolerance_deg = tolerance_deg
+        self._out_dir = out_dir
+        self._edge_metric = EdgeMetric(EdgeMetricParameters())
+        self._place = recorder.node.create_publisher(PointStamped, "sim/target_pose", 10)
+
+    def wait_until_ready(self) -> None:
+        """Wait until every node has been heard."""
+        recorder = self._recorder
+        recorder.wait_for("ground truth from sim_node", lambda: recorder.truths, 40.0, self._alive)
+        recorder.wait_for("vergence/edge from edge_metric_node", lambda: recorder.edges, 40.0, self._alive)
+        recorder.wait_for("gaze/state from gaze_controller_node", lambda: recorder.states, 40.0, self._alive)
+        recorder.wait_for("sim_node to take targets", self._place.get_subscription_count, 20.0, self._alive)
+
+    def visit(self, station: Station) -> StationResult:
+        """Show the target, look at it as a person would who clicks on the left image, and return what happened."""
+        recorder = self._recorder
+        self._show(station, (10.0, 0.0, -10.0))  # out of sight until the eyes are at the start
+        recorder.set_parameters("gaze_controller_node", {"mode": "both_eyes"}, self._alive)
+        self._look_at_angles(station)
+        recorder.settle(_SETTLE_S, self._alive)
+        recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._alive)
+        self._show(station, station.place_m or self._fixation_m())
+        shown_at = recorder.now_s()
+        truth = recorder.wait_for(
+            f"{station.target} in both views", lambda: self._seen(station, shown_at), 10.0, self._alive
+        )
+        before = recorder.picture(self._alive)
+        self._store(station, "start", before)
+
+        began = recorder.now_s()
+        marks = len(recorder.states), len(recorder.edges), len(recorder.truths)
+        truth = recorder.truths[-1].message if station.moving else truth
+        result = recorder.look_at(_click(truth), self._alive, _LIMIT_S + 10.0)
+        reason = "" if result.result == LookAt.Result.VERGED else result.reason
+        recorder.settle(station.hold_s, self._alive)
+        after = recorder.picture(self._alive)
+        self._store(station, "end", after)
+        if station.moving:
+            recorder.set_parameters("sim_node", {"motion.kind": "static"}, self._alive)
+        return self._result(station, began, marks, reason, before, after)
+
+    def _show(self, station: Station, place_m: Sequence[float]) -> None:
+        message = PointStamped()
+        message.header.stamp = self._recorder.node.get_clock().now().to_msg()
+        message.header.frame_id = "rig_base"
+        message.point.x, message.point.y, message.point.z = (float(value) for value in place_m)
+        self._place.publish(message)
+
+    def _look_at_angles(self, station: Station) -> None:
+        goal = LookAt.Goal(kind=LookAt.Goal.ANGLES, time_limit_s=5.0)
+        goal.version_rad = math.radians(station.start_version_deg)
+        goal.vergence_rad = math.radians(station.start_vergence_deg)
+        goal.tilt_rad = math.radians(station.start_tilt_deg)
+        self._recorder.look_at(goal, self._alive)
+
+    def _fixation_m(self) -> Sequence[float]:
+        """Return where the graph itself says that the axes meet, now that the eyes are still."""
+        now = self._recorder.now_s()
+        entry = self._recorder.wait_for(
+            "gaze/fixation_point from gaze_controller_node",
+            lambda: next((entry for entry in self._recorder.fixations[-1:] if entry.arrival_s >= now), None),
+            5.0,
+            self._alive,
+        )
+        point = entry.message.point
+        return point.x, point.y, point.z
+
+    def _seen(self, station: Station, since_s: float) -> Any:
+        entry = self._recorder.truths[-1]
+        truth = entry.message
+        exposed_s = to_nanoseconds(truth.header.stamp) * 1e-9
+        inside = truth.target == station.target and exposed_s > since_s
+        return truth if inside and min(truth.left_visible_share, truth.right_visible_share) > 0.2 else None
+
+    def _store(self, station: Station, moment: str, picture: StereoPicture) -> None:
+        folder = self._out_dir / "pictures"
+        measured = self._edge_metric.measure(picture.left_bgr, picture.right_bgr)
+        windows = [int(size) for size in picture.edge.windows_px]
+        left, right = measured.left_edges.mask, measured.right_edges.mask
+        name = f"{station.name}_{moment}"
+        write_image(folder / f"{name}_left.jpg", with_cross(picture.left_bgr))
+        write_image(folder / f"{name}_right.jpg", with_cross(picture.right_bgr))
+        write_image(folder / f"{name}_left_edges.png", left)
+        write_image(folder / f"{name}_right_edges.png", right)
+        write_image(folder / f"{name}_combined.png", with_windows(combined_edges(left, right), windows))
+
+    def _result(
+        self,
+        station: Station,
+        began_s: float,
+        marks: tuple[int, int, int],
+        reason: str,
+        before: StereoPicture,
+        after: StereoPicture,
+    ) -> StationResult:
+        recorder = self._recorder
+        states, edges, truths = recorder.states[marks[0] :], recorder.edges[marks[1] :], recorder.truths[marks[2] :]
+        held_from_s = recorder.now_s() - station.hold_s
+        held = [entry.message.verged for entry in states if entry.arrival_s >= held_from_s]
+        # Following a moving target, single cycles without the word are allowed; the last half second is not.
+        lately = [entry.message.verged for entry in states if entry.arrival_s >= recorder.now_s() - 0.5]
+        said = bool(held) and np.mean(held) >= 0.8 and (all(lately) or station.moving) and not reason
+        if not said and not reason:
+            reason = (
+                f"verged in {100 * np.mean(held):.0f} % of the hold: {states[-1].message.reason}"
+                if held
+                else "no state"
+            )
+        said_at = next((entry.arrival_s for entry in states if entry.message.verged), math.nan)
+        end_truths = [entry.message for entry in truths if entry.arrival_s >= held_from_s]
+        final = truths[-1].message
+        fixation = states[-1].message.target
+        return StationResult(
+            name=station.name,
+            title=station.title,
+            moving=station.moving,
+            said_verged=bool(said),
+            reason=reason,
+            time_s=said_at - began_s,
+            true_error_deg=_median_deg([truth.vergence_error_rad for truth in end_truths]),
+            off_axis_deg=max(
+                _median_deg([truth.left_error_rad for truth in end_truths]),
+                _median_deg([truth.right_error_rad for truth in end_truths]),
+            ),
+            tolerance_deg=self._tolerance_deg,
+            off_axis_tolerance_deg=math.degrees(math.atan(_FOVEA_HALF_PX / self._rig.left_camera.fx_px)),
+            start=_table(before.edge),
+            end=_table(after.edge),
+            fixation_m=(fixation.x, fixation.y, fixation.z),
+            target_m=(final.target_point.x, final.target_point.y, final.target_point.z),
+            series=_series(began_s, states, edges, truths),
+        )
+
+
+def _click(truth: Any) -> LookAt.Goal:
+    """Return the goal of a person who clicks on the target in the left image: one pixel, no depth."""
+    goal = LookAt.Goal(kind=LookAt.Goal.PIXEL, eye=LookAt.Goal.EYE_LEFT, time_limit_s=_LIMIT_S, depth_m=math.nan)
+    goal.header.stamp = truth.header.stamp
+    goal.left_x_px, goal.left_y_px = float(round(truth.left_x_px)), float(round(truth.left_y_px))
+    return goal
+
+
+def _median_deg(values_rad: Sequence[float]) -> float:
+    return math.degrees(float(np.median(np.abs(values_rad)))) if len(values_rad) else math.nan
+
+
+def _table(edge: EdgeVergence) -> MetricTable:
+    windows = [int(size) for size in edge.windows_px]
+    return MetricTable(windows, list(edge.left_to_right_px), list(edge.right_to_left_px), list(edge.contrast))
+
+
+def _series(began_s: float, states: Sequence[Stamped], edges: Sequence[Stamped], truths: Sequence[Stamped]) -> Series:
+    def stamps(entries: Sequence[Stamped]) -> Floats:
+        return np.array([to_nanoseconds(entry.message.header.stamp) * 1e-9 - began_s for entry in entries])
+
+    column = 0
+    if edges:
+        windows = list(edges[0].message.windows_px)
+        column = windows.index(100) if 100 in windows else 0
+    metric = [0.5 * (e.message.left_to_right_px[column] + e.message.right_to_left_px[column]) for e in edges]
+    true_vergence = np.array([entry.message.pan_right_rad - entry.message.pan_left_rad for entry in truths])
+    error = np.array([entry.message.vergence_error_rad for entry in truths])
+    return Series(
+        time_s=stamps(edges),
+        metric_px=np.array(metric, np.float64),
+        contrast=np.array([entry.message.contrast[column] for entry in edges], np.float64),
+        state_time_s=np.array([entry.arrival_s - began_s for entry in states]),
+        vergence_deg=np.degrees([entry.message.vergence_rad for entry in states]),
+        truth_time_s=stamps(truths),
+        true_vergence_deg=np.degrees(true_vergence),
+        wanted_vergence_deg=np.degrees(true_vergence + error),
+    )
+
+
+__all__ = ["GraphError", "StationRunner", "tolerance_deg"]

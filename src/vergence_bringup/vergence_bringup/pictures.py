@@ -1,0 +1,59 @@
+"""Pictures of pairs and their edges, for files and reports. No ROS in it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Image = npt.NDArray[np.uint8]
+
+
+class PictureError(ValueError):
+    """A picture that cannot be read or written."""
+
+
+def read_image(path: Path) -> Image:
+    """Return an image file as (h, w, 3) BGR uint8; raises PictureError where it is none."""
+    if not path.is_file():
+        raise PictureError(f"image {path}: no such file")
+    image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR) if path.stat().st_size else None
+    if image is None:
+        raise PictureError(f"image {path}: allowed is a whole PNG, JPEG or another format that OpenCV reads")
+    return np.asarray(image, np.uint8)
+
+
+def write_image(path: Path, image: npt.NDArray[Any]) -> None:
+    """Write an image, its folder with it; raises PictureError where that is not possible."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(path), image):
+        raise PictureError(f"image {path}: cannot be written")
+
+
+def combined_edges(left_mask: npt.NDArray[Any], right_mask: npt.NDArray[Any]) -> Image:
+    """Return both edge masks (h, w) in one BGR picture: left red, right cyan, both white."""
+    picture = np.zeros((*left_mask.shape, 3), np.uint8)
+    picture[left_mask > 0, 2] = 255
+    picture[right_mask > 0, :2] = 255
+    return picture
+
+
+def with_windows(picture: Image, windows_px: Sequence[int]) -> Image:
+    """Return a copy with the outlines of the centre windows drawn on it."""
+    framed = picture.copy()
+    height, width = framed.shape[:2]
+    for size in windows_px:
+        row, column = height // 2 - size // 2, width // 2 - size // 2
+        cv2.rectangle(framed, (column, row), (column + size - 1, row + size - 1), (90, 200, 90), 1)
+    return framed
+
+
+def with_cross(picture: Image) -> Image:
+    """Return a copy with a cross where the optical axis is: the image's centre."""
+    marked = picture.copy()
+    centre = (marked.shape[1] // 2, marked.shape[0] // 2)
+    cv2.drawMarker(marked, centre, (0, 0, 0), cv2.MARKER_CROSS, 25, 3)
+    cv2.drawMarker(marked, centre, (80, 255, 255), cv2.MARKER_CROSS, 23, 1)
+    return marked

@@ -1,0 +1,163 @@
+"""Nodes as processes of their own: found, started, watched and ended together."""
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import IO
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix, get_package_share_directory
+
+_PR_SET_PDEATHSIG = 1
+
+
+class ProcessError(ValueError):
+    """A node that cannot be started, or that ended by itself."""
+
+
+def config_dir() -> Path:
+    """Return the folder of the shipped YAML files: VERGENCE_CONFIG_DIR, or the installed one."""
+    if "VERGENCE_CONFIG_DIR" in os.environ:
+        return Path(os.environ["VERGENCE_CONFIG_DIR"])
+    return Path(get_package_share_directory("vergence_bringup")) / "config"
+
+
+def find_executable(package: str, executable: str) -> Path:
+    """Return the path that `ros2 run package executable` would run."""
+    try:
+        path = Path(get_package_prefix(package)) / "lib" / package / executable
+    except PackageNotFoundError:
+        raise ProcessError(
+            f"package {package!r} is not built or not sourced: source env.sh, or run make setup"
+        ) from None
+    if not path.exists():
+        raise ProcessError(f"{package} has no executable {executable!r}: allowed is what lies in {path.parent}")
+    return path
+
+
+@dataclass(frozen=True)
+class NodeCommand:
+    """One node to run: parameters override its YAML file, remappings are 'from:=to'."""
+
+    package: str
+    executable: str
+    parameters: Mapping[str, object] | None = None
+    remappings: Sequence[str] = ()
+    params_file: Path | None = None
+
+    def argv(self) -> list[str]:
+        """Return the command line."""
+        argv = [str(find_executable(self.package, self.executable)), "--ros-args"]
+        params_file = self.params_file or config_dir() / f"{self.executable}.yaml"
+        argv += ["--params-file", str(params_file)]
+        for name, value in (self.parameters or {}).items():
+            argv += ["-p", f"{name}:={_yaml(value)}"]
+        for remapping in self.remappings:
+            argv += ["-r", remapping]
+        return argv
+
+
+def _yaml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_yaml(element) for element in value) + "]"
+    # The quotes keep an empty or a numeric text a text.
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+def environment(extra: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Return this process's environment with the shipped Fast DDS profile, discovery kept to this host, and `extra`."""
+    env = dict(os.environ)
+    env.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(config_dir() / "fastdds.xml"))
+    env.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    env["PYTHONUNBUFFERED"] = "1"
+    return env | dict(extra or {})
+
+
+class ProcessGroup:
+    """Processes that live and end together; a context manager that ends them all on the way out.
+
+    Each runs in a process group of its own, so that a Ctrl-C in the terminal reaches it only through `stop`, once; and
+    each asks the kernel for SIGTERM should this process die without a chance to stop it.
+    """
+
+    def __init__(self, log_dir: Path | None = None, extra_environment: Mapping[str, str] | None = None) -> None:
+        self._log_dir = log_dir
+        self._environment = environment(extra_environment)
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+        self._logs: list[IO[bytes]] = []
+
+    def __enter__(self) -> "ProcessGroup":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def start(self, name: str, command: NodeCommand) -> None:
+        """Start one node; its output goes to `<log_dir>/<name>.log`, or to this process's."""
+        output: IO[bytes] | None = None
+        if self._log_dir is not None:
+            self._log_dir.mkdir(parents=True, exist_ok=True)
+            output = open(self._log_dir / f"{name}.log", "wb")  # noqa: SIM115 - closed by stop()
+            self._logs.append(output)
+        self._running[name] = subprocess.Popen(
+            command.argv(),
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT if output else None,
+            env=self._environment,
+            start_new_session=True,
+            preexec_fn=_die_with_parent,
+        )
+
+    def check(self) -> None:
+        """Raise ProcessError if a process has ended by itself."""
+        for name, process in self._running.items():
+            if process.poll() is not None:
+                raise ProcessError(f"{name} ended with status {process.returncode}{self._tail(name)}")
+
+    def stop(self, patience_s: float = 5.0) -> dict[str, int]:
+        """End every process: SIGINT, then SIGTERM, then SIGKILL. Returns the exit status of each by name."""
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+            waiting = [process for process in self._running.values() if process.poll() is None]
+            for process in waiting:
+                _signal_group(process.pid, number)
+            deadline = time.monotonic() + patience_s
+            for process in waiting:
+                try:
+                    process.wait(max(0.01, deadline - time.monotonic()))
+                except subprocess.TimeoutExpired:
+                    continue
+        statuses = {name: process.returncode for name, process in self._running.items()}
+        for log in self._logs:
+            log.close()
+        self._running, self._logs = {}, []
+        return statuses
+
+    def _tail(self, name: str) -> str:
+        if self._log_dir is None:
+            return ""
+        path = self._log_dir / f"{name}.log"
+        lines = path.read_text(errors="replace").strip().splitlines()[-5:]
+        return f"; the end of {path}:\n  " + "\n  ".join(lines)
+
+
+def _signal_group(pid: int, number: int) -> None:
+    try:
+        os.killpg(pid, number)
+    except ProcessLookupError:
+        return
+
+
+def _die_with_parent() -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
