@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+
 from vergence_rig.parameters import ParameterError, Parameters, ParameterSpec, UnknownParameterError
 
 ROS_OWN = ("use_sim_time", "start_type_description_service")

@@ -1,0 +1,73 @@
+"""A real head on one machine: two cameras, the metrics, the controller and the servos.
+
+ros2 launch vergence_bringup rig.launch.py left_device:=/dev/v4l/by-id/... right_device:=/dev/v4l/by-id/...
+With the servos on another machine use laptop.launch.py there and pi.launch.py here, or servos:=false.
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, GroupAction, SetEnvironmentVariable
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node, PushRosNamespace
+
+
+def generate_launch_description() -> LaunchDescription:
+    config = Path(get_package_share_directory("vergence_bringup")) / "config"
+    rig = LaunchConfiguration("rig")
+
+    def camera(eye: str) -> Node:
+        # camera_node publishes image_raw and camera_info relative to its namespace: left/... and right/...
+        return Node(
+            package="vergence_camera",
+            executable="camera_node",
+            name="camera_node",
+            namespace=eye,
+            output="screen",
+            parameters=[
+                str(config / "camera_node.yaml"),
+                {
+                    "rig": rig,
+                    "device": LaunchConfiguration(f"{eye}_device"),
+                    "camera_info_url": LaunchConfiguration(f"{eye}_camera_info_url"),
+                    "frame_id": f"{eye}_camera_optical_frame",
+                },
+            ],
+        )
+
+    def node(package: str, executable: str, condition: str | None = None) -> Node:
+        return Node(
+            package=package,
+            executable=executable,
+            output="screen",
+            parameters=[str(config / f"{executable}.yaml"), {"rig": rig}],
+            condition=IfCondition(LaunchConfiguration(condition)) if condition else None,
+        )
+
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument("left_device", description="the left camera: by-id path, serial, /dev/videoN or URL"),
+            DeclareLaunchArgument("right_device", description="the right camera"),
+            DeclareLaunchArgument("left_camera_info_url", default_value="", description="file:// or package:// YAML"),
+            DeclareLaunchArgument("right_camera_info_url", default_value=""),
+            DeclareLaunchArgument("namespace", default_value="", description="namespace of the whole head"),
+            DeclareLaunchArgument("rig", default_value=str(config / "rig.yaml"), description="the rig's description"),
+            DeclareLaunchArgument("servos", default_value="true", description="run servo_node on this machine"),
+            DeclareLaunchArgument("boxes", default_value="false", description="run box_metric_node, the detector"),
+            DeclareLaunchArgument("fastdds_profile", default_value=str(config / "fastdds.xml")),
+            SetEnvironmentVariable("FASTRTPS_DEFAULT_PROFILES_FILE", LaunchConfiguration("fastdds_profile")),
+            GroupAction(
+                [
+                    PushRosNamespace(LaunchConfiguration("namespace")),
+                    camera("left"),
+                    camera("right"),
+                    node("vergence_metric", "edge_metric_node"),
+                    node("vergence_metric", "box_metric_node", "boxes"),
+                    node("vergence_servo", "gaze_controller_node"),
+                    node("vergence_servo", "servo_node", "servos"),
+                ]
+            ),
+        ]
+    )

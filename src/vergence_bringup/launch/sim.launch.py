@@ -1,0 +1,45 @@
+"""The whole graph on the simulated head: sim_node, edge_metric_node, gaze_controller_node.
+
+ros2 launch vergence_bringup sim.launch.py [preset:=ideal] [namespace:=head]
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, GroupAction, SetEnvironmentVariable
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node, PushRosNamespace
+
+
+def generate_launch_description() -> LaunchDescription:
+    config = Path(get_package_share_directory("vergence_bringup")) / "config"
+    rig = LaunchConfiguration("rig")
+
+    def node(package: str, executable: str, **parameters: object) -> Node:
+        return Node(
+            package=package,
+            executable=executable,
+            output="screen",
+            parameters=[str(config / f"{executable}.yaml"), {"rig": rig, **parameters}],
+        )
+
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument("namespace", default_value="", description="namespace of the whole head"),
+            DeclareLaunchArgument("rig", default_value=str(config / "rig.yaml"), description="the rig's description"),
+            DeclareLaunchArgument(
+                "preset", default_value="realistic", description="realistic or ideal cameras and servos"
+            ),
+            DeclareLaunchArgument("fastdds_profile", default_value=str(config / "fastdds.xml")),
+            SetEnvironmentVariable("FASTRTPS_DEFAULT_PROFILES_FILE", LaunchConfiguration("fastdds_profile")),
+            GroupAction(
+                [
+                    PushRosNamespace(LaunchConfiguration("namespace")),
+                    node("vergence_sim", "sim_node", preset=LaunchConfiguration("preset")),
+                    node("vergence_metric", "edge_metric_node"),
+                    node("vergence_servo", "gaze_controller_node"),
+                ]
+            ),
+        ]
+    )
