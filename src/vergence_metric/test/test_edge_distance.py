@@ -1,11 +1,14 @@
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from vergence_metric.edge_distance import WindowStatus, edge_distances
+
+from vergence_metric.edge_distance import EdgeDistances, WindowStatus, edge_distances
+from vergence_metric.nearest_edges import NearestEdges
 from vergence_metric.windows import Window, centre_windows
 
 Mask = NDArray[np.uint8]
@@ -18,6 +21,10 @@ def pairwise(from_mask: Mask, to_mask: Mask, window: Window) -> float:
     if not len(a) or not len(b):
         return math.nan
     return float(np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2)).min(axis=1).mean())
+
+
+def measure(left: Mask, right: Mask, windows: Sequence[Window]) -> EdgeDistances:
+    return edge_distances(NearestEdges(left, right, windows))
 
 
 def random_mask(rng: np.random.Generator, height: int, width: int, share: float) -> Mask:
@@ -39,7 +46,7 @@ def test_equal_to_the_definition(
     rng = np.random.default_rng(seed)
     left, right = random_mask(rng, height, width, left_share), random_mask(rng, height, width, right_share)
     windows = centre_windows(sizes, height, width)
-    measured = edge_distances(left, right, windows)
+    measured = measure(left, right, windows)
     for i, window in enumerate(windows):
         np.testing.assert_allclose(measured.left_to_right_px[i], pairwise(left, right, window), rtol=0, atol=1e-9)
         np.testing.assert_allclose(measured.right_to_left_px[i], pairwise(right, left, window), rtol=0, atol=1e-9)
@@ -51,7 +58,7 @@ def test_equal_to_the_definition_at_full_size() -> None:
     rng = np.random.default_rng(3)
     left, right = random_mask(rng, 480, 640, 0.01), random_mask(rng, 480, 640, 0.0005)
     windows = centre_windows((50, 100, 150, 200, 250, 300), 480, 640)
-    measured = edge_distances(left, right, windows)
+    measured = measure(left, right, windows)
     for i, window in enumerate(windows):
         np.testing.assert_allclose(measured.left_to_right_px[i], pairwise(left, right, window), rtol=0, atol=1e-9)
         np.testing.assert_allclose(measured.right_to_left_px[i], pairwise(right, left, window), rtol=0, atol=1e-9)
@@ -62,7 +69,7 @@ def test_a_neighbour_outside_the_window_does_not_count() -> None:
     left[41, 50] = 255  # in the 20 px window, one row below its upper border
     right[39, 50] = 255  # just above it
     right[59, 50] = 255  # far, but inside
-    small, large = edge_distances(left, right, centre_windows((20, 40), 100, 100)).left_to_right_px
+    small, large = measure(left, right, centre_windows((20, 40), 100, 100)).left_to_right_px
     assert small == 18.0
     assert large == 2.0
 
@@ -80,7 +87,7 @@ def test_no_edges_is_nan_with_the_reason(in_left: bool, in_right: bool, status: 
     left, right = np.zeros((40, 40), np.uint8), np.zeros((40, 40), np.uint8)
     left[20, 20], right[20, 23] = 255 * in_left, 255 * in_right
     left[0, 0] = right[0, 0] = 255  # outside the window: of no account
-    measured = edge_distances(left, right, centre_windows((20,), 40, 40))
+    measured = measure(left, right, centre_windows((20,), 40, 40))
     assert measured.status.tolist() == [status]
     expected = 3.0 if status is WindowStatus.OK else math.nan
     np.testing.assert_equal(measured.left_to_right_px, [expected])
@@ -89,7 +96,7 @@ def test_no_edges_is_nan_with_the_reason(in_left: bool, in_right: bool, status: 
 
 def test_a_window_larger_than_the_image_is_measured_and_marked() -> None:
     mask = np.eye(30, 50, k=10, dtype=np.uint8)
-    measured = edge_distances(mask, mask, centre_windows((20, 40), 30, 50))
+    measured = measure(mask, mask, centre_windows((20, 40), 30, 50))
     assert measured.status.tolist() == [WindowStatus.OK, WindowStatus.WINDOW_CLIPPED]
     assert measured.left_count.tolist() == [20, 30]
     np.testing.assert_equal(measured.left_to_right_px, [0.0, 0.0])

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from vergence_metric.windows import WindowError, centre_window, centre_windows
 
 

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.nearest_edges import LEFT_TO_RIGHT, RIGHT_TO_LEFT, NearestEdges
 from vergence_metric.windows import Window
 
 
@@ -43,24 +43,21 @@ class EdgeDistances:
     status: NDArray[np.uint8]
 
 
-def edge_distances(
-    left_mask: NDArray[np.uint8], right_mask: NDArray[np.uint8], windows: Sequence[Window]
-) -> EdgeDistances:
-    """Return the metric of two edge masks (h, w), nonzero at edge pixels, in every window.
-
-    Equal to the pairwise definition up to the rounding of float64.
-    """
-    n = len(windows)
-    left_to_right, right_to_left = np.full(n, np.nan), np.full(n, np.nan)
-    left_count, right_count = np.zeros(n, np.int64), np.zeros(n, np.int64)
-    for i, window in enumerate(windows):
-        left, right = left_mask[window.slices], right_mask[window.slices]
-        left_count[i], right_count[i] = cv2.countNonZero(left), cv2.countNonZero(right)
-        if left_count[i] and right_count[i]:
-            left_to_right[i] = _mean_distance(left, right)
-            right_to_left[i] = _mean_distance(right, left)
+def edge_distances(field: NearestEdges) -> EdgeDistances:
+    """Return the metric in every window of `field`, equal to the pairwise definition up to float64's rounding."""
+    n = len(field.windows)
+    points = [field.edge_points(direction, i) for direction in (LEFT_TO_RIGHT, RIGHT_TO_LEFT) for i in range(n)]
+    squares = field.squared_distances(points)
+    left_count = np.array([len(p) for p in points[:n]], np.int64)
+    right_count = np.array([len(p) for p in points[n:]], np.int64)
+    measurable = (left_count > 0) & (right_count > 0)
+    means = [np.sqrt(s, dtype=np.float64).mean() if ok else np.nan for s, ok in zip(squares, np.tile(measurable, 2))]
     return EdgeDistances(
-        left_to_right, right_to_left, left_count, right_count, window_status(windows, left_count, right_count)
+        np.array(means[:n]),
+        np.array(means[n:]),
+        left_count,
+        right_count,
+        window_status(field.windows, left_count, right_count),
     )
 
 
@@ -73,10 +70,3 @@ def window_status(
     status[right_count == 0] = WindowStatus.NO_RIGHT_EDGES
     status[(left_count == 0) & (right_count == 0)] = WindowStatus.NO_EDGES
     return status
-
-
-def _mean_distance(from_mask: NDArray[np.uint8], to_mask: NDArray[np.uint8]) -> float:
-    distance = cv2.distanceTransform((to_mask == 0).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    nearest = distance[from_mask > 0].astype(np.float64)
-    # the transform is float32; squared distances between pixels are whole numbers, so rounding makes it exact
-    return float(np.sqrt(np.rint(nearest * nearest)).mean())

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vergence_metric.edge_distance import EdgeDistances, edge_distances
 from vergence_metric.edge_parameters import EdgeMetricParameters
 from vergence_metric.edges import Edges, Grey, ImageShapeError, detect_edges, to_grey
+from vergence_metric.nearest_edges import NearestEdges
 from vergence_metric.windows import Window, centre_windows
 
 
@@ -69,6 +70,6 @@ class EdgeMetric:
         right_edges = detect_edges(right_grey, self.parameters)
         edges_done = time.perf_counter()
         windows = centre_windows(self.parameters.windows_px, *left_grey.shape)
-        distances = edge_distances(left_edges.mask, right_edges.mask, windows)
+        distances = edge_distances(NearestEdges(left_edges.mask, right_edges.mask, windows))
         stage_s = {"edges": edges_done - started, "distance": time.perf_counter() - edges_done}
         return EdgeMetricResult(windows, left_grey, right_grey, left_edges, right_edges, distances, stage_s)
