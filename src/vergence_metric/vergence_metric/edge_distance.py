@@ -51,7 +51,10 @@ def edge_distances(field: NearestEdges) -> EdgeDistances:
     left_count = np.array([len(p) for p in points[:n]], np.int64)
     right_count = np.array([len(p) for p in points[n:]], np.int64)
     measurable = (left_count > 0) & (right_count > 0)
-    means = [np.sqrt(s, dtype=np.float64).mean() if ok else np.nan for s, ok in zip(squares, np.tile(measurable, 2))]
+    means = [
+        np.sqrt(found, dtype=np.float64).mean() if ok else np.nan
+        for found, ok in zip(squares, np.tile(measurable, 2), strict=True)
+    ]
     return EdgeDistances(
         np.array(means[:n]),
         np.array(means[n:]),

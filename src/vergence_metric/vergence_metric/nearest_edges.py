@@ -60,8 +60,9 @@ class NearestEdges:
         """
         n = len(self.windows)
         widths = [self.windows[i % n].width for i in range(2 * n)]
-        index = np.concatenate([p + start for p, start in zip(points, self._starts)])
-        row_start = np.concatenate([p - p % width + start for p, width, start in zip(points, widths, self._starts)])
+        blocks = list(zip(points, widths, self._starts[:-1], strict=True))
+        index = np.concatenate([flat + start for flat, _, start in blocks])
+        row_start = np.concatenate([flat - flat % width + start for flat, width, start in blocks])
         row_end = row_start + np.repeat(np.array(widths, np.int64) - 1, [len(p) for p in points])
         squares = _search(self._vertical, index, row_start, row_end)
         return np.split(squares, np.cumsum([len(p) for p in points[:-1]]))
@@ -121,7 +122,7 @@ def _scan(edges: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any], int]:
 def _search(
     vertical: NDArray[Any], index: NDArray[np.int64], row_start: NDArray[np.int64], row_end: NDArray[np.int64]
 ) -> NDArray[Any]:
-    """Return min over x' of (x - x')^2 + vertical(x'), for points at flat `index` in rows from `row_start` to `row_end`.
+    """Return min over x' of (x - x')^2 + vertical(x'), for points `index` in rows from `row_start` to `row_end`.
 
     Steps that would leave the row are held at its end: too far by their own reckoning, so never below the truth.
     """
