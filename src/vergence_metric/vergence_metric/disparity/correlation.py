@@ -1,0 +1,157 @@
+"""Windowed normalised cross-correlation of one point against a range of shifts, and what it is worth.
+
+The window is Gaussian, so that the point itself counts most. Correlation is invariant to gain and offset.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence_metric.disparity.fovea_pair import Strip
+
+REACH_IN_SIGMAS = 2.5
+"""Windows are cut off at this many standard deviations; beyond lies 1 % of the weight."""
+
+_NOISE_GAIN = math.sqrt(math.pi / 2) / 6  # Immerkaer, "Fast noise variance estimation", 1996
+_LAPLACIAN = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
+_DIFFERENCE = np.array([[-0.5, 0.0, 0.5]], np.float32)
+
+
+def radius_of(sigma: float) -> int:
+    """Return the window's radius in pixels."""
+    return math.ceil(REACH_IN_SIGMAS * sigma)
+
+
+@lru_cache(maxsize=32)
+def _window(sigma: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the Gaussian in one dimension as (n, 1) and in two as (n, n); both sum to 1."""
+    radius = radius_of(sigma)
+    line = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    line /= line.sum()
+    return line[:, None].astype(np.float32), np.outer(line, line).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Texture:
+    """What the window about a point holds.
+
+    `deviation` is the weighted standard deviation of the grey values, `noise` that of the pixel noise in it (both in
+    grey levels), `independent` the number of independent samples: the window's area over the texture's correlation
+    area, both as standard deviations of Gaussians.
+    """
+
+    deviation: float
+    noise: float
+    independent: float
+
+    @property
+    def signal(self) -> float:
+        """Standard deviation of the texture without the noise, in grey levels."""
+        return math.sqrt(max(self.deviation**2 - self.noise**2, 0.0))
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Correlation against shifts: `zncc[j, i]` belongs to vertical disparity first_v + j, horizontal first_d + i."""
+
+    zncc: NDArray[np.float32]
+    first_d: int
+    first_v: int
+    texture: Texture
+
+    @property
+    def profile(self) -> NDArray[np.float32]:
+        """The best correlation over vertical disparity, for each horizontal one."""
+        return self.zncc.max(axis=0)
+
+    def peak_near(self, d: float, tolerance: int) -> tuple[int, int, float]:
+        """Return (i, j, correlation) of the best shift whose horizontal disparity is within tolerance of d."""
+        width = self.zncc.shape[1]
+        low = min(max(round(d) - self.first_d - tolerance, 0), width - 1)
+        high = min(max(round(d) - self.first_d + tolerance + 1, low + 1), width)
+        part = self.zncc[:, low:high]
+        j, i = divmod(int(part.argmax()), high - low)
+        return low + i, j, float(part[j, i])
+
+    def subpixel(self, i: int, j: int) -> tuple[float, float]:
+        """Return (horizontal, vertical) disparity of the peak at column i, row j by a parabola in each direction."""
+        z = self.zncc
+        rows, columns = z.shape
+        di = _parabola(z[j, i - 1], z[j, i], z[j, i + 1]) if 0 < i < columns - 1 else 0.0
+        dj = _parabola(z[j - 1, i], z[j, i], z[j + 1, i]) if 0 < j < rows - 1 else 0.0
+        return self.first_d + i + di, self.first_v + j + dj
+
+
+def _parabola(before: float, at: float, after: float) -> float:
+    bend = float(before) - 2.0 * float(at) + float(after)
+    return 0.0 if bend >= -1e-9 else float(np.clip(0.5 * (float(before) - float(after)) / bend, -0.5, 0.5))
+
+
+def texture_of(patch: NDArray[np.float32], sigma: float) -> Texture:
+    """Measure the texture of a window's patch (n, n) with n = 2 * radius_of(sigma) + 1."""
+    weights = _window(sigma)[1]
+    centred = patch - float((weights * patch).sum())
+    variance = float((weights * centred * centred).sum())
+    # Strong texture raises Immerkaer's mean of absolute values; the median only follows what most pixels do.
+    residual = np.abs(cv2.filter2D(patch, cv2.CV_32F, _LAPLACIAN)[1:-1, 1:-1])
+    noise = min(1.4826 * float(np.median(residual)) / 6.0, _NOISE_GAIN * float(residual.mean()))
+    gx = cv2.filter2D(patch, cv2.CV_32F, _DIFFERENCE)
+    gy = cv2.filter2D(patch, cv2.CV_32F, _DIFFERENCE.T)
+    # White noise of deviation s adds s^2/2 to the squared central difference.
+    floor = 1e-6
+    along = [max(float((weights * g * g).sum()) - noise**2 / 2, floor) for g in (gx, gy)]
+    signal = max(variance - noise**2, floor)
+    lengths = [min(max(math.sqrt(signal / g), 1.0), 2.0 * sigma) for g in along]
+    return Texture(math.sqrt(variance), noise, 4.0 * sigma**2 / (lengths[0] * lengths[1]))
+
+
+def correlate(
+    source: Strip,
+    other: Strip,
+    at: tuple[int, int],
+    sigma: float,
+    d_range: tuple[int, int],
+    v_range: tuple[int, int],
+    sign: int = -1,
+) -> Surface:
+    """Correlate the window about a point of one eye with the other eye's, for every whole shift in a range.
+
+    Args:
+        source: the eye whose point is asked for.
+        other: the eye that is searched.
+        at: (x, y) of the point in `source`, at the strips' resolution.
+        sigma: of the Gaussian window, in pixels of this resolution.
+        d_range: first and last horizontal disparity, inclusive.
+        v_range: first and last vertical disparity, inclusive.
+        sign: -1 from left to right (x_right = x_left - d), +1 from right to left.
+
+    Returns:
+        Surface of shape (v_last - v_first + 1, d_last - d_first + 1).
+
+    """
+    radius = radius_of(sigma)
+    line, weights = _window(sigma)
+    x, y = at[0] - int(source.x0), at[1] - int(source.y0)
+    patch = source.grey[y - radius : y + radius + 1, x - radius : x + radius + 1]
+    texture = texture_of(patch, sigma)
+    kernel = weights * (patch - float((weights * patch).sum()))
+
+    xs = sorted(at[0] + sign * d for d in d_range)
+    ys = sorted(at[1] + sign * v for v in v_range)
+    top, first = ys[0] - int(other.y0) - radius, xs[0] - int(other.x0) - radius
+    strip = other.grey[top : ys[1] - int(other.y0) + radius + 1, first : xs[1] - int(other.x0) + radius + 1]
+    strip = strip - float(strip.mean())  # keeps the float32 sum of squares exact enough
+    product = cv2.matchTemplate(strip, kernel, cv2.TM_CCORR)
+    inner = (slice(radius, -radius), slice(radius, -radius))
+    mean = cv2.sepFilter2D(strip, cv2.CV_32F, line, line)[inner]
+    square = cv2.sepFilter2D(strip * strip, cv2.CV_32F, line, line)[inner]
+    # One grey level squared on both sides: flat areas correlate to nothing instead of to noise.
+    variance = np.maximum(square - mean * mean, 0.0) + 1.0
+    zncc = product / np.sqrt(variance * (texture.deviation**2 + 1.0))
+    if sign < 0:
+        zncc = zncc[::-1, ::-1]
+    return Surface(np.ascontiguousarray(zncc), d_range[0], v_range[0], texture)

@@ -1,0 +1,48 @@
+"""How sure a match is, as a share of like answers that are right."""
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for a match.
+
+    `correlation` is its windowed correlation, `independent` the number of independent samples in the window, `places`
+    how many shifts were tried, `rival` the best correlation of another candidate (0 if there is none) and
+    `left_right_px` how far matching back misses.
+    """
+
+    correlation: float
+    independent: float
+    places: float
+    rival: float
+    left_right_px: float
+
+    @classmethod
+    def nothing(cls) -> "Evidence":
+        """Return the evidence of no match at all."""
+        return cls(0.0, 0.0, 1.0, 0.0, math.inf)
+
+    @property
+    def significance(self) -> float:
+        """How far the correlation lies above chance, in standard deviations (Fisher's z), less the luck of the best.
+
+        The best of n unrelated places lies about sqrt(2 ln n) deviations above none.
+        """
+        r = min(max(self.correlation, 0.0), 0.995)
+        deviations = math.atanh(r) * math.sqrt(max(self.independent - 3.0, 0.0))
+        return deviations - math.sqrt(2.0 * math.log(max(self.places, 1.0)))
+
+    @property
+    def beyond_chance(self) -> bool:
+        """True if unrelated images would rarely correlate as well."""
+        return self.significance > 1.5
+
+    @property
+    def confidence(self) -> float:
+        """Share of answers with this evidence that lie within 2 px of the truth, from 0 to 1."""
+        certain = 1.0 / (1.0 + math.exp(-2.0 * (self.significance - 1.5)))
+        unique = 1.0 if self.correlation <= 0 else min(max(2.0 * (1.0 - self.rival / self.correlation), 0.0), 1.0)
+        returns = 1.0 if self.left_right_px <= 2.0 else 0.1
+        return certain * unique * returns

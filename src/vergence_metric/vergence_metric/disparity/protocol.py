@@ -1,0 +1,105 @@
+"""What every disparity estimator takes and gives."""
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+
+
+class DisparityInputError(ValueError):
+    """Images or a point that no estimator can work on."""
+
+
+class DisparityStatus(IntEnum):
+    """Why there is an answer or none; the numbers are those of VergenceError.msg."""
+
+    OK = 0
+    NO_TEXTURE = 1
+    AMBIGUOUS = 2
+    NO_MATCH = 3
+    OUT_OF_RANGE = 4
+
+
+@dataclass(frozen=True)
+class Disparity:
+    """The disparity of one point of the left image.
+
+    `horizontal_px` is x_left - x_right, `vertical_px` is y_left - y_right of the world point seen at `point_px` (x, y)
+    of the left image; positive horizontal means nearer than where the axes cross. `sigma_px` is the standard deviation
+    of the horizontal one as far as image noise and texture explain it. `confidence` is the share of answers with the
+    same evidence that lie within 2 px of the truth (see `evidence.py`). Where `status` is not OK the figures are NaN,
+    except that an OUT_OF_RANGE or AMBIGUOUS answer keeps its best guess for those who log it; its confidence is at
+    most 0.5.
+    """
+
+    horizontal_px: float
+    vertical_px: float
+    sigma_px: float
+    confidence: float
+    status: DisparityStatus
+    reason: str
+    estimator: str
+    point_px: tuple[float, float]
+
+    @property
+    def ok(self) -> bool:
+        """True if the answer may be used."""
+        return self.status is DisparityStatus.OK
+
+    @classmethod
+    def none(cls, status: DisparityStatus, reason: str, estimator: str, point_px: tuple[float, float]) -> "Disparity":
+        """Return the absence of an answer, and why."""
+        return cls(math.nan, math.nan, math.nan, 0.0, status, reason, estimator, point_px)
+
+
+class DisparityEstimator(Protocol):
+    """Anything that answers with the disparity at a point."""
+
+    @property
+    def name(self) -> str:
+        """The name it is selected by."""
+        ...
+
+    def estimate(
+        self,
+        left: Image,
+        right: Image,
+        point_px: tuple[float, float] | None = None,
+        expected_px: float | None = None,
+    ) -> Disparity:
+        """Return the disparity at a point of the left image.
+
+        Args:
+            left: (h, w) grey image of the left eye.
+            right: (h, w) grey image of the right eye, of the same size, rows roughly aligned.
+            point_px: (x, y) in the left image; None for its centre ((w - 1)/2, (h - 1)/2).
+            expected_px: where the horizontal disparity should be about: searched first, and alone if that is sure.
+
+        Raises:
+            DisparityInputError: images that are not grey uint8 of one size, or a point outside them.
+
+        """
+        ...
+
+
+def checked_point(left: Image, right: Image, point_px: tuple[float, float] | None) -> tuple[float, float]:
+    """Return the point asked for, the centre if None; raise DisparityInputError for input that cannot be."""
+    for name, image in (("left", left), ("right", right)):
+        if image.ndim != 2 or image.dtype != np.uint8 or image.size == 0:
+            raise DisparityInputError(
+                f"{name} image is {image.dtype} {image.shape}: allowed is uint8 (h, w), not empty"
+            )
+    if left.shape != right.shape:
+        raise DisparityInputError(f"right image is {right.shape}: allowed is the left one's size {left.shape}")
+    height, width = left.shape
+    if point_px is None:
+        return (width - 1) / 2, (height - 1) / 2
+    x, y = float(point_px[0]), float(point_px[1])
+    if not (0.0 <= x <= width - 1 and 0.0 <= y <= height - 1):
+        raise DisparityInputError(f"point is ({x:g}, {y:g}): allowed is inside the {width}x{height} image")
+    return x, y
