@@ -1,0 +1,52 @@
+"""Joint angles of the recent past, so that an image is judged by the pose it was taken in."""
+
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.rig import JOINT_NAMES
+
+
+class _Sample(NamedTuple):
+    stamp_ns: int
+    angles: tuple[float, ...]
+
+
+class JointHistory:
+    """Keeps the last seconds of the three joints; other joints of a message are ignored.
+
+    `extrapolate_ns` is how far beyond the newest sample an answer is still given: the newest one.
+    """
+
+    def __init__(self, keep_ns: int = 2_000_000_000, extrapolate_ns: int = 200_000_000) -> None:
+        self._keep_ns = keep_ns
+        self._extrapolate_ns = extrapolate_ns
+        self._samples: deque[_Sample] = deque(maxlen=4096)
+
+    def add(self, stamp_ns: int, names: Sequence[str], positions_rad: Sequence[float]) -> bool:
+        """Take a joint state; False if it lacks a joint or a position. A stamp that goes back begins anew."""
+        found = dict(zip(names, positions_rad, strict=False))
+        if any(name not in found for name in JOINT_NAMES):
+            return False
+        if self._samples and stamp_ns < self._samples[-1].stamp_ns:
+            self._samples.clear()
+        self._samples.append(_Sample(stamp_ns, tuple(found[name] for name in JOINT_NAMES)))
+        while self._samples[0].stamp_ns < stamp_ns - self._keep_ns:
+            self._samples.popleft()
+        return True
+
+    def at(self, stamp_ns: int) -> EyeAngles | None:
+        """Return the eyes' angles at that time, between samples by straight lines; None where nothing is known."""
+        samples = list(self._samples)  # the executor's thread adds while a worker asks
+        if not samples or stamp_ns < samples[0].stamp_ns or stamp_ns > samples[-1].stamp_ns + self._extrapolate_ns:
+            return None
+        after = bisect_left(samples, stamp_ns, key=lambda sample: sample.stamp_ns)
+        if after == len(samples):
+            return EyeAngles(*samples[-1].angles)
+        if samples[after].stamp_ns == stamp_ns or after == 0:
+            return EyeAngles(*samples[after].angles)
+        a, b = samples[after - 1], samples[after]
+        share = (stamp_ns - a.stamp_ns) / (b.stamp_ns - a.stamp_ns)
+        return EyeAngles(*(x + share * (y - x) for x, y in zip(a.angles, b.angles, strict=True)))

@@ -1,0 +1,62 @@
+"""One thread that works on the newest item only: what it could not reach in time is dropped and counted."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from queue import SimpleQueue
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+
+class LatestWorker(Generic[Item]):
+    """Runs `work(item)` for the newest item submitted, one at a time, on a thread of its own.
+
+    `submit` is for one thread, never waits and takes no lock that `work` could hold. An exception of `work` goes to
+    `on_error` and the next item is worked on.
+    """
+
+    def __init__(self, work: Callable[[Item], None], on_error: Callable[[Exception], None], name: str) -> None:
+        self._work = work
+        self._on_error = on_error
+        self._newest: deque[Item] = deque(maxlen=1)
+        self._wake: SimpleQueue[bool] = SimpleQueue()
+        self._submitted = 0
+        self._taken = 0
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def submit(self, item: Item) -> None:
+        """Let `item` be worked on next, in place of one that still waits."""
+        self._submitted += 1
+        self._newest.append(item)
+        self._wake.put(True)
+
+    @property
+    def worked(self) -> int:
+        """Items that were taken up."""
+        return self._taken
+
+    @property
+    def dropped(self) -> int:
+        """Items that a newer one replaced before they were taken up."""
+        return max(self._submitted - self._taken - len(self._newest), 0)
+
+    def close(self, timeout_s: float = 5.0) -> None:
+        """Finish the item at hand and end the thread; idempotent."""
+        self._newest.clear()
+        self._wake.put(False)
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        while self._wake.get():
+            try:
+                item = self._newest.popleft()
+            except IndexError:
+                continue
+            self._taken += 1
+            try:
+                self._work(item)
+            except Exception as error:
+                self._on_error(error)
+            del item  # two images: not to be kept alive until the next pair

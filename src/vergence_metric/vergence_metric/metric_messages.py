@@ -1,0 +1,59 @@
+"""Results of the pure metric as messages."""
+
+import math
+
+import numpy as np
+from std_msgs.msg import Header
+
+from vergence_metric.disparity import Disparity
+from vergence_metric.edge_metric import EdgeMetricResult
+from vergence_metric.viewing_angles import AngularDisparity
+from vergence_msgs.msg import EdgeVergence, VergenceError
+
+
+def edge_message(result: EdgeMetricResult, header: Header, pair_skew_s: float) -> EdgeVergence:
+    """Return metric I of a pair; `header` is the left image's."""
+    nothing = np.full(len(result.windows), math.nan)
+    return EdgeVergence(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        windows_px=result.windows_px,
+        left_to_right_px=result.left_to_right_px,
+        right_to_left_px=result.right_to_left_px,
+        left_edge_count=result.distances.left_count.astype(np.uint32),
+        right_edge_count=result.distances.right_count.astype(np.uint32),
+        chance_left_to_right_px=nothing,
+        chance_right_to_left_px=nothing,
+        contrast_left_to_right=nothing,
+        contrast_right_to_left=nothing,
+        contrast=nothing,
+        robust_left_to_right_px=nothing,
+        robust_right_to_left_px=nothing,
+        status=result.status,
+        align_mode="none",
+        align_vertical_px=math.nan,
+        align_roll_rad=math.nan,
+    )
+
+
+def error_message(
+    disparity: Disparity, angular: AngularDisparity | None, header: Header, pair_skew_s: float
+) -> VergenceError:
+    """Return the signed disparity of a pair; `angular` is None while the cameras are not described."""
+    message = VergenceError(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        horizontal_px=disparity.horizontal_px if angular is None else angular.horizontal_px,
+        vertical_px=disparity.vertical_px if angular is None else angular.vertical_px,
+        horizontal_rad=math.nan if angular is None else angular.horizontal_rad,
+        vertical_rad=math.nan if angular is None else angular.vertical_rad,
+        sigma_px=disparity.sigma_px,
+        confidence=disparity.confidence,
+        estimator=disparity.estimator,
+        status=int(disparity.status),
+        reason=disparity.reason,
+    )
+    if angular is None and disparity.ok:
+        message.status = VergenceError.STATUS_NO_CAMERA_INFO
+        message.reason = "no camera_info for these images yet: angles are NaN"
+    return message
