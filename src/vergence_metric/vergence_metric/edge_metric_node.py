@@ -7,23 +7,25 @@ from typing import Any
 
 import cv2
 from rclpy.node import Node
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import Image, JointState
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.images import array_to_image
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
-from vergence_metric.disparity import make_estimator
-from vergence_metric.edge_metric import EdgeMetric
+from vergence_common.stamps import to_nanoseconds
+from vergence_metric.edge_metric import EdgeMetricResult
 from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
+from vergence_metric.joint_history import JointHistory
 from vergence_metric.latest_worker import LatestWorker
-from vergence_metric.metric_messages import edge_message, error_message
+from vergence_metric.metric_messages import edge_message, error_message, track_message
 from vergence_metric.overlay import draw_overlay
+from vergence_metric.pair_measurement import Models, PairMeasurement
 from vergence_metric.stage_times import StageTimes
 from vergence_metric.stereo_messages import ImagePair, StereoInput
 from vergence_metric.viewing_angles import angular_disparity
-from vergence_msgs.msg import EdgeVergence, VergenceError
+from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
 from vergence_rig.rig import default_rig, load_rig
 
 
@@ -33,56 +35,64 @@ class EdgeMetricNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("edge_metric_node", **options)
         self._settings = declare(self, EdgeMetricNodeParameters)
-        self._apply(self._settings.value)
-        self._rig = load_rig(self._current.rig) if self._current.rig else default_rig()
+        settings: EdgeMetricNodeParameters = self._settings.value
+        cv2.setNumThreads(settings.threads or -1)
+        self._measurement = PairMeasurement(settings, load_rig(settings.rig) if settings.rig else default_rig())
+        self._joints = JointHistory()
         self._times = StageTimes()
         self._failure: str | None = None
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
         self._edge_publisher = qos.create_publisher(EdgeVergence, "vergence/edge")
         self._error_publisher = qos.create_publisher(VergenceError, "vergence/error")
+        self._track_publisher = qos.create_publisher(TargetTrack, "vergence/track")
         self._overlay_publisher = qos.create_publisher(Image, "vergence/overlay", IMAGE_QOS)
         self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
-        self._input = StereoInput(self, self._current, diagnostics, qos, self._worker.submit)
-        self._settings.on_change(self._on_parameters)
+        self._stereo = StereoInput(self, settings, diagnostics, qos, self._worker.submit)
+        self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
+        self._settings.on_change(self._on_settings)
         diagnostics.add("measurement", self._report)
 
     def close(self) -> None:
         """End the measuring thread."""
         self._worker.close()
 
-    def _apply(self, parameters: EdgeMetricNodeParameters) -> None:
-        cv2.setNumThreads(parameters.threads if parameters.threads else -1)
-        self._metric = EdgeMetric(parameters)
-        self._estimator = make_estimator(parameters)
-        self._current = parameters
+    def _on_settings(self, settings: ParameterSet) -> None:
+        cv2.setNumThreads(settings.value.threads or -1)
+        self._stereo.set_parameters(settings.value)
 
-    def _on_parameters(self, parameters: ParameterSet) -> None:
-        self._input.set_parameters(parameters.value)
+    def _on_joints(self, message: JointState) -> None:
+        self._joints.add(to_nanoseconds(message.header.stamp), message.name, message.position)
 
     def _measure(self, pair: ImagePair) -> None:
-        wanted = self._settings.value
-        if wanted is not self._current:
-            self._apply(wanted)
-        header, skew_s = pair.left.header, pair.skew_ns * 1e-9
+        self._measurement.set_parameters(self._settings.value)
         with self._times.measure("metric"):
-            result = self._metric.measure(pair.left.pixels, pair.right.pixels)
+            edge = self._measurement.edge(pair.left.pixels, pair.right.pixels)
+        header, skew_s = pair.left.header, pair.skew_ns * 1e-9
         with self._times.measure("publish"):
-            self._edge_publisher.publish(edge_message(result, header, skew_s))
-        self._times.add_all(result.stage_s)
-        self._times.add("until_edge", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
+            self._edge_publisher.publish(edge_message(edge, header, skew_s))
+        self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
+        self._times.add_all(edge.stage_s)
+        models = self._stereo.models_for(pair.left.pixels)
         with self._times.measure("disparity"):
-            disparity = self._estimator.estimate(result.left_grey, result.right_grey)
-        models = self._input.models_for(pair.left.pixels)
+            disparity = self._measurement.disparity(edge)
         angular = models and angular_disparity(
             *models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px
         )
         self._error_publisher.publish(error_message(disparity, angular, header, skew_s))
+        self._publish_track(pair, edge, models)
         if self._overlay_publisher.get_subscription_count():
             with self._times.measure("overlay"):
-                picture = draw_overlay(pair.left.pixels, result, disparity)
+                picture = draw_overlay(pair.left.pixels, edge, disparity)
                 self._overlay_publisher.publish(array_to_image(picture, header))
         self._failure = None
+
+    def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, models: Models | None) -> None:
+        with self._times.measure("tracker"):
+            eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
+            track = self._measurement.track(edge, pair.left_stamp_ns * 1e-9, eyes, models)
+        angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
+        self._track_publisher.publish(track_message(track, angular, pair.left.header, pair.skew_ns * 1e-9))
 
     def _on_failure(self, error: Exception) -> None:
         self._failure = f"{type(error).__name__}: {error}"
@@ -92,7 +102,7 @@ class EdgeMetricNode(Node):
     def _report(self) -> Report:
         worked, dropped = self._worker.worked, self._worker.dropped
         values: dict[str, object] = {"measured": worked, "dropped": dropped}
-        values |= self._input.decode_times.summary() | self._times.summary()
+        values |= self._stereo.decode_times.summary() | self._times.summary()
         if self._failure is not None:
             return Report(ERROR, f"the last pair could not be measured: {self._failure}", values)
         if dropped:

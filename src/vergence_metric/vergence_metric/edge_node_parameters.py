@@ -1,18 +1,17 @@
-"""Parameters of edge_metric_node: those of its input, its metric and its disparity estimator in one set."""
+"""Parameters of edge_metric_node: those of its input, its metric, its disparity estimator and its tracker in one set."""
 
 from dataclasses import dataclass
 
 from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.fovea_parameters import DisparityParameters
+from vergence_metric.fovea_parameters import DisparityParameters, TrackerParameters
 from vergence_metric.stereo_parameters import StereoParameters
 
 
 @dataclass(frozen=True)
-class EdgeMetricNodeParameters(StereoParameters, DisparityParameters, EdgeMetricParameters):
+class EdgeMetricNodeParameters(TrackerParameters, DisparityParameters, EdgeMetricParameters, StereoParameters):
     """Everything edge_metric_node can be told; defaults equal config/edge_metric_node.yaml."""
 
     def check(self) -> None:
         """Hold every part to its own rules."""
-        StereoParameters.check(self)
-        DisparityParameters.check(self)
-        EdgeMetricParameters.check(self)
+        for part in (TrackerParameters, DisparityParameters, EdgeMetricParameters, StereoParameters):
+            part.check(self)

@@ -8,10 +8,12 @@ from typing import NamedTuple
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import JOINT_NAMES
 
+_PAN_LEFT, _PAN_RIGHT, _TILT = range(3)
+
 
 class _Sample(NamedTuple):
     stamp_ns: int
-    angles: tuple[float, ...]
+    angles_rad: tuple[float, ...]
 
 
 class JointHistory:
@@ -37,16 +39,28 @@ class JointHistory:
             self._samples.popleft()
         return True
 
-    def at(self, stamp_ns: int) -> EyeAngles | None:
-        """Return the eyes' angles at that time, between samples by straight lines; None where nothing is known."""
+    def at(self, left_stamp_ns: int, right_stamp_ns: int) -> EyeAngles | None:
+        """Return the left pan and the tilt at the left image's stamp and the right pan at the right one's.
+
+        Between samples by straight lines. None where nothing is known; a head that never told its joints is taken to
+        rest straight ahead, so that images alone can be measured.
+        """
         samples = list(self._samples)  # the executor's thread adds while a worker asks
-        if not samples or stamp_ns < samples[0].stamp_ns or stamp_ns > samples[-1].stamp_ns + self._extrapolate_ns:
+        if not samples:
+            return EyeAngles(0.0, 0.0, 0.0)
+        left, right = self._interpolated(samples, left_stamp_ns), self._interpolated(samples, right_stamp_ns)
+        if left is None or right is None:
+            return None
+        return EyeAngles(left[_PAN_LEFT], right[_PAN_RIGHT], left[_TILT])
+
+    def _interpolated(self, samples: list[_Sample], stamp_ns: int) -> tuple[float, ...] | None:
+        if stamp_ns < samples[0].stamp_ns or stamp_ns > samples[-1].stamp_ns + self._extrapolate_ns:
             return None
         after = bisect_left(samples, stamp_ns, key=lambda sample: sample.stamp_ns)
         if after == len(samples):
-            return EyeAngles(*samples[-1].angles)
-        if samples[after].stamp_ns == stamp_ns or after == 0:
-            return EyeAngles(*samples[after].angles)
+            return samples[-1].angles_rad
+        if samples[after].stamp_ns == stamp_ns:
+            return samples[after].angles_rad
         a, b = samples[after - 1], samples[after]
         share = (stamp_ns - a.stamp_ns) / (b.stamp_ns - a.stamp_ns)
-        return EyeAngles(*(x + share * (y - x) for x, y in zip(a.angles, b.angles, strict=True)))
+        return tuple(x + share * (y - x) for x, y in zip(a.angles_rad, b.angles_rad, strict=True))

@@ -5,10 +5,12 @@ import math
 import numpy as np
 from std_msgs.msg import Header
 
+from vergence_common.stamps import to_stamp
 from vergence_metric.disparity import Disparity
 from vergence_metric.edge_metric import EdgeMetricResult
+from vergence_metric.tracker import Track
 from vergence_metric.viewing_angles import AngularDisparity
-from vergence_msgs.msg import EdgeVergence, VergenceError
+from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
 
 
 def edge_message(result: EdgeMetricResult, header: Header, pair_skew_s: float) -> EdgeVergence:
@@ -57,3 +59,25 @@ def error_message(
         message.status = VergenceError.STATUS_NO_CAMERA_INFO
         message.reason = "no camera_info for these images yet: angles are NaN"
     return message
+
+
+def track_message(track: Track, angular: AngularDisparity | None, header: Header, pair_skew_s: float) -> TargetTrack:
+    """Return where the target is; `angular` is None while the cameras are not described."""
+    return TargetTrack(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        track_id=track.track_id,
+        lock_stamp=to_stamp(track.lock_stamp_s if math.isfinite(track.lock_stamp_s) else 0.0),
+        left_x_px=track.left_px[0],
+        left_y_px=track.left_px[1],
+        right_x_px=track.right_px[0],
+        right_y_px=track.right_px[1],
+        disparity_px=track.disparity_px if angular is None else angular.horizontal_px,
+        disparity_rad=math.nan if angular is None else angular.horizontal_rad,
+        sigma_px=track.sigma_px,
+        extent_width_px=track.extent_px[0],
+        extent_height_px=track.extent_px[1],
+        confidence=track.confidence,
+        status=int(track.status),
+        reason=track.reason,
+    )

@@ -24,7 +24,7 @@ def draw_overlay(left: NDArray[Any], result: EdgeMetricResult, disparity: Dispar
     gives the metric in both directions.
     """
     colour = cv2.cvtColor(left, cv2.COLOR_GRAY2BGR) if left.ndim == 2 else left
-    picture: NDArray[np.uint8] = colour >> 1
+    picture = np.right_shift(colour, 1, dtype=np.uint8)
     in_left, in_right = result.left_edges.mask > 0, result.right_edges.mask > 0
     picture[in_left] = LEFT_BGR
     picture[in_right] = RIGHT_BGR

@@ -1,0 +1,81 @@
+"""All that is measured on a pair of images, stage by stage, so that each can be published as soon as it is known."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import NDArray
+
+from vergence_metric.disparity import Disparity, make_estimator
+from vergence_metric.edge_metric import EdgeMetric, EdgeMetricResult
+from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
+from vergence_metric.tracker import TargetTracker, Track, TrackStatus
+from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.rig import Rig
+
+Models = tuple[CameraModel, CameraModel]
+
+
+class PairMeasurement:
+    """Metric I, the fovea's signed disparity and the followed target of pair after pair, in order of their stamps."""
+
+    def __init__(self, parameters: EdgeMetricNodeParameters, rig: Rig) -> None:
+        self._rig_models = (CameraModel(rig.left_camera), CameraModel(rig.right_camera))
+        self._tracker: TargetTracker | None = None
+        self._models: Models | None = None
+        self._ids_used = 0
+        self._newest_id = 0
+        self._build(parameters)
+
+    @property
+    def parameters(self) -> EdgeMetricNodeParameters:
+        """The parameters in force."""
+        return self._parameters
+
+    def set_parameters(self, parameters: EdgeMetricNodeParameters) -> None:
+        """Measure the next pair by these; the tracker forgets its target."""
+        if parameters != self._parameters:
+            self._build(parameters)
+
+    def edge(self, left: NDArray[Any], right: NDArray[Any]) -> EdgeMetricResult:
+        """Return metric I of a pair of images of one size; raises ImageShapeError for others."""
+        return self._metric.measure(left, right)
+
+    def disparity(self, edge: EdgeMetricResult) -> Disparity:
+        """Return the signed disparity at the left image's centre of a pair measured by `edge`."""
+        return self._estimator.estimate(edge.left_grey, edge.right_grey)
+
+    def track(self, edge: EdgeMetricResult, stamp_s: float, eyes: EyeAngles | None, models: Models | None) -> Track:
+        """Return where the target is in a pair measured by `edge`.
+
+        Args:
+            edge: the pair.
+            stamp_s: of the left image.
+            eyes: joint angles at the images' stamps, None if they are not known.
+            models: both cameras; None takes those of the rig, if they are of the images' size.
+        """
+        height, width = edge.left_grey.shape
+        models = models or self._rig_models
+        if any((model.width_px, model.height_px) != (width, height) for model in models):
+            return self._nothing(f"no camera is described for images of {width}x{height}")
+        if eyes is None:
+            return self._nothing("no joint_states at the image's stamp")
+        if self._tracker is None or models != self._models:
+            self._models, self._ids_used = models, self._newest_id
+            self._tracker = TargetTracker(self._parameters, self._estimator, *models)
+        track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes)
+        self._newest_id = self._ids_used + track.track_id
+        return replace(track, track_id=self._newest_id)
+
+    def _build(self, parameters: EdgeMetricNodeParameters) -> None:
+        self._parameters = parameters
+        self._metric = EdgeMetric(parameters)
+        self._estimator = make_estimator(parameters)
+        self._tracker = None
+
+    def _nothing(self, reason: str) -> Track:
+        nan = math.nan
+        return Track(
+            self._newest_id, nan, (nan, nan), (nan, nan), nan, nan, nan, (nan, nan), 0.0, TrackStatus.UNLOCKED, reason
+        )
