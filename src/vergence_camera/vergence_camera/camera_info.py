@@ -1,0 +1,158 @@
+"""A camera's calibration in the standard YAML of the ROS calibrators, and where its URL leads."""
+
+import math
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import yaml
+
+DISTORTION_LENGTHS = {"plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14), "equidistant": (4,)}
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+class CalibrationError(ValueError):
+    """A calibration that cannot be: names the file, the entry, its value and what is allowed."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Intrinsics of one camera. `k` (9), `r` (9) and `p` (12) are row by row; `d` fits `distortion_model`."""
+
+    width_px: int
+    height_px: int
+    k: tuple[float, ...]
+    d: tuple[float, ...]
+    distortion_model: str = "plumb_bob"
+    r: tuple[float, ...] = IDENTITY
+    p: tuple[float, ...] = ()
+    name: str = "camera"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "p", tuple(self.p) or self._monocular_projection())
+        for entry, length in (("camera_matrix", 9), ("rectification_matrix", 9), ("projection_matrix", 12)):
+            values = {"camera_matrix": self.k, "rectification_matrix": self.r, "projection_matrix": self.p}[entry]
+            if len(values) != length or not all(math.isfinite(value) for value in values):
+                raise CalibrationError(f"{entry} is {list(values)}: allowed are {length} finite numbers")
+        if self.width_px < 1 or self.height_px < 1:
+            raise CalibrationError(f"image size is {self.width_px}x{self.height_px}: allowed is at least 1x1")
+        if not (self.k[0] > 0.0 and self.k[4] > 0.0):
+            raise CalibrationError(f"focal lengths are {self.k[0]:g}, {self.k[4]:g}: allowed is above 0")
+        lengths = DISTORTION_LENGTHS.get(self.distortion_model)
+        if lengths is None:
+            known = ", ".join(DISTORTION_LENGTHS)
+            raise CalibrationError(f"distortion_model is {self.distortion_model!r}: allowed is one of {known}")
+        if len(self.d) not in lengths or not all(math.isfinite(value) for value in self.d):
+            allowed = " or ".join(map(str, lengths))
+            raise CalibrationError(f"distortion_coefficients is {list(self.d)}: allowed are {allowed} finite numbers")
+
+    def _monocular_projection(self) -> tuple[float, ...]:
+        k = self.k
+        return (*k[0:3], 0.0, *k[3:6], 0.0, *k[6:9], 0.0)
+
+
+def load_calibration(path: Path) -> Calibration:
+    """Return the calibration in a YAML file; raise CalibrationError if it is not one."""
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise CalibrationError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
+    try:
+        return _from_document(document)
+    except CalibrationError as error:
+        raise CalibrationError(f"{path}: {error}") from None
+
+
+def save_calibration(calibration: Calibration, path: Path) -> None:
+    """Write the calibration, whole or not at all; raise OSError if that cannot be done."""
+    document = {
+        "image_width": calibration.width_px,
+        "image_height": calibration.height_px,
+        "camera_name": calibration.name,
+        "camera_matrix": _matrix(3, 3, calibration.k),
+        "distortion_model": calibration.distortion_model,
+        "distortion_coefficients": _matrix(1, len(calibration.d), calibration.d),
+        "rectification_matrix": _matrix(3, 3, calibration.r),
+        "projection_matrix": _matrix(3, 4, calibration.p),
+    }
+    write_yaml(document, path)
+
+
+def write_yaml(document: dict[str, Any], path: Path) -> None:
+    """Write a document beside `path` first and then into its place, so that no reader sees half of it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
+    descriptor, partial = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.chmod(partial, 0o644)
+        os.replace(partial, path)
+    except BaseException:
+        os.unlink(partial)
+        raise
+
+
+def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -> Path:
+    """Return the file that a camera_info URL means.
+
+    Args:
+        url: `file:///...` or `package://PACKAGE/...`; `${NAME}` and `${ROS_HOME}` are filled in. Empty is the place
+            that ROS's camera drivers share, `${ROS_HOME}/camera_info/${NAME}.yaml`.
+        name: the camera's name.
+        package_share: gives the share directory of a package; raises LookupError for an unknown one.
+
+    Raises:
+        CalibrationError: another kind of URL, or an unknown package.
+    """
+    ros_home = os.environ.get("ROS_HOME") or str(Path.home() / ".ros")
+    filled = (url or "file://${ROS_HOME}/camera_info/${NAME}.yaml").replace("${ROS_HOME}", ros_home)
+    filled = filled.replace("${NAME}", name)
+    parts = urlsplit(filled)
+    if parts.scheme == "file" and parts.netloc in ("", "localhost") and parts.path:
+        return Path(unquote(parts.path))
+    if parts.scheme == "package" and parts.netloc and parts.path:
+        try:
+            return Path(package_share(parts.netloc)) / unquote(parts.path).lstrip("/")
+        except LookupError as error:
+            raise CalibrationError(f"camera_info_url is '{url}': there is no package '{parts.netloc}'") from error
+    raise CalibrationError(f"camera_info_url is '{url}': allowed is file:///PATH or package://PACKAGE/PATH")
+
+
+def _matrix(rows: int, columns: int, data: Sequence[float]) -> dict[str, Any]:
+    return {"rows": rows, "cols": columns, "data": [float(value) for value in data]}
+
+
+def _from_document(document: Any) -> Calibration:
+    if not isinstance(document, dict):
+        raise CalibrationError("is no mapping of image_width, camera_matrix, ...")
+    k = _numbers(document, "camera_matrix")
+    return Calibration(
+        width_px=_whole(document, "image_width"),
+        height_px=_whole(document, "image_height"),
+        name=str(document.get("camera_name", "camera")),
+        k=k,
+        d=_numbers(document, "distortion_coefficients"),
+        distortion_model=str(document.get("distortion_model", "plumb_bob")),
+        r=_numbers(document, "rectification_matrix") if "rectification_matrix" in document else IDENTITY,
+        p=_numbers(document, "projection_matrix") if "projection_matrix" in document else (),
+    )
+
+
+def _whole(document: dict[str, Any], entry: str) -> int:
+    value = document.get(entry)
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise CalibrationError(f"{entry} is {value!r}: allowed is a whole number")
+    return value
+
+
+def _numbers(document: dict[str, Any], entry: str) -> tuple[float, ...]:
+    value = document.get(entry)
+    data = value.get("data") if isinstance(value, dict) else None
+    if not isinstance(data, list) or not all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in data):
+        raise CalibrationError(f"{entry} is {value!r}: allowed is a mapping with a list of numbers under 'data'")
+    return tuple(float(x) for x in data)

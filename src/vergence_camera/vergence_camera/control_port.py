@@ -1,0 +1,133 @@
+"""The controls of a camera that comes and goes: wanted values outlive the connection."""
+
+import threading
+from collections.abc import Callable, Mapping
+
+from vergence_camera.errors import CameraError, ControlError, DisconnectedError
+from vergence_camera.v4l2 import structures as v4l2
+from vergence_camera.v4l2.controls import Controls, ControlSpec, Value
+from vergence_camera.v4l2.kernel import Kernel
+
+# What is switched off, in order, and what is then the same for both eyes.
+_AUTOMATIC = {
+    v4l2.CID_EXPOSURE_AUTO: v4l2.EXPOSURE_MANUAL,
+    v4l2.CID_EXPOSURE_AUTO_PRIORITY: 0,
+    v4l2.CID_AUTO_WHITE_BALANCE: 0,
+    v4l2.CID_AUTOGAIN: 0,
+}
+_LOCKED = (v4l2.CID_EXPOSURE_ABSOLUTE, v4l2.CID_GAIN, v4l2.CID_WHITE_BALANCE_TEMPERATURE)
+
+
+class ControlPort:
+    """Where the node reaches the controls. It is the DeviceUser of the source: safe to use from any thread.
+
+    `say` gets a line for each wanted value that the camera refuses when it comes back.
+    """
+
+    def __init__(self, say: Callable[[str], None] = lambda text: None) -> None:
+        self._say = say
+        self._lock = threading.RLock()
+        self._controls: Controls | None = None
+        self._specs: dict[str, ControlSpec] = {}
+        self._wanted: dict[str, object] = {}
+        self.generation = 0
+
+    def attach(self, kernel: Kernel, descriptor: int, path: str) -> None:
+        """See DeviceUser: the wanted values are set again, since a camera forgets them when it is unplugged."""
+        with self._lock:
+            self._controls = Controls(kernel, descriptor, path)
+            self._specs = self._controls.specs()
+            try:
+                if self._wanted:
+                    self._controls.apply(self._wanted)
+            except ControlError as error:
+                if self.generation == 0:
+                    self._controls = None
+                    raise
+                self._say(str(error))
+            self.generation += 1
+
+    def detach(self) -> None:
+        """See DeviceUser."""
+        with self._lock:
+            self._controls = None
+
+    @property
+    def attached(self) -> bool:
+        """True while the device is open."""
+        with self._lock:
+            return self._controls is not None
+
+    def want(self, values: Mapping[str, object]) -> None:
+        """Set `values` whenever the camera comes; used before the first connection."""
+        with self._lock:
+            self._wanted.update(values)
+
+    def specs(self) -> dict[str, ControlSpec]:
+        """Return the controls of the camera that was last seen; empty before the first."""
+        with self._lock:
+            return dict(self._specs)
+
+    def values(self) -> dict[str, Value]:
+        """Return the camera's present values; empty while it is away."""
+        with self._lock:
+            try:
+                return self._controls.values() if self._controls is not None else {}
+            except CameraError:  # it is just being unplugged; the capture thread says so
+                return {}
+
+    def set(self, changes: Mapping[str, object]) -> dict[str, Value]:
+        """Set all of `changes` or none (see Controls.apply) and want them from now on."""
+        with self._lock:
+            result = self._present().apply(changes)
+            self._wanted.update(changes)
+            return result
+
+    def hold(self) -> dict[str, Value]:
+        """Switch the automatic modes off and keep exposure, gain and white balance where they are now.
+
+        Returns the controls that were set, and their values.
+        """
+        return self.follow({})
+
+    def follow(self, leader: Mapping[str, object]) -> dict[str, Value]:
+        """Switch the automatic modes off and take exposure, gain and white balance over from the other eye.
+
+        Args:
+            leader: control values by name; those that this camera lacks are left out, numbers beyond its range are
+                clipped into it. A locked control that is missing keeps its present value.
+
+        Returns:
+            The controls that were set, and their values.
+        """
+        with self._lock:
+            controls = self._present()
+            specs = controls.specs()
+            present = controls.values()
+            changes: dict[str, object] = {}
+            for spec in specs.values():
+                if spec.read_only:
+                    continue
+                if spec.cid in _AUTOMATIC:
+                    if not spec.is_menu or _AUTOMATIC[spec.cid] in spec.menu:
+                        changes[spec.name] = spec.to_value(_AUTOMATIC[spec.cid])
+                elif spec.cid in _LOCKED:
+                    changes[spec.name] = _clipped(spec, leader.get(spec.name, present[spec.name]))
+            return self.set(changes)
+
+    def locked_names(self) -> tuple[str, ...]:
+        """Return the names of the controls that both eyes must have in common."""
+        with self._lock:
+            return tuple(spec.name for spec in self._specs.values() if spec.cid in _LOCKED or spec.cid in _AUTOMATIC)
+
+    def _present(self) -> Controls:
+        if self._controls is None:
+            raise DisconnectedError("the camera is not connected: its controls cannot be set now")
+        return self._controls
+
+
+def _clipped(spec: ControlSpec, value: object) -> object:
+    if not isinstance(value, int) or isinstance(value, bool):
+        return value
+    steps = round((min(max(value, spec.minimum), spec.maximum) - spec.minimum) / max(1, spec.step))
+    return min(spec.minimum + steps * max(1, spec.step), spec.maximum)

@@ -1,0 +1,148 @@
+"""Everything that is counted about one camera; written by the capture thread, read by diagnostics."""
+
+import statistics
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from vergence_camera.errors import CameraError
+from vergence_camera.frame import Mode
+
+_WINDOW = 150
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The state at one moment. Times are in seconds; NaN where nothing has been measured yet."""
+
+    connected: bool
+    ended: bool
+    mode: Mode | None
+    frames: int
+    rate_hz: float
+    age_s: float
+    stamp_to_publish_s: float
+    lost_before_us: int
+    skipped: int
+    too_old: int
+    corrupt: int
+    reconnects: int
+    faults: dict[str, int]
+    last_fault: str
+
+    def values(self) -> dict[str, object]:
+        """Return the figures by name, for a diagnostic."""
+        return {
+            "frames": self.frames,
+            "rate_hz": round(self.rate_hz, 2),
+            "age_s": round(self.age_s, 4),
+            "stamp_to_publish_ms": round(self.stamp_to_publish_s * 1e3, 3),
+            "lost_before_the_node": self.lost_before_us,
+            "dropped_for_newer": self.skipped,
+            "dropped_too_old": self.too_old,
+            "dropped_corrupt": self.corrupt,
+            "reconnects": self.reconnects,
+            **{f"fault.{kind}": count for kind, count in sorted(self.faults.items())},
+            "last_fault": self.last_fault or "none",
+        }
+
+
+@dataclass
+class _Counts:
+    frames: int = 0
+    lost_before_us: int = 0
+    skipped: int = 0
+    too_old: int = 0
+    corrupt: int = 0
+    reconnects: int = 0
+    faults: Counter[str] = field(default_factory=Counter)
+
+
+class Health:
+    """Thread-safe counters. `now_s` is a steady clock."""
+
+    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+        self._now_s = now_s
+        self._lock = threading.Lock()
+        self._counts = _Counts()
+        self._arrivals_s: deque[float] = deque(maxlen=_WINDOW)
+        self._delays_s: deque[float] = deque(maxlen=_WINDOW)
+        self._mode: Mode | None = None
+        self._was_connected = self._connected = self._ended = False
+        self._last_fault = ""
+        self._last_sequence: int | None = None
+        self._corrupt_since_last = 0
+
+    def connected(self, mode: Mode) -> None:
+        """The stream has begun, or begun again."""
+        with self._lock:
+            self._counts.reconnects += int(self._was_connected)
+            self._was_connected = self._connected = True
+            self._mode, self._last_sequence, self._corrupt_since_last = mode, None, 0
+            self._arrivals_s.clear()
+
+    def fault(self, error: CameraError) -> None:
+        """The stream has failed, or could not be begun."""
+        with self._lock:
+            self._connected = False
+            self._counts.faults[error.kind] += 1
+            self._last_fault = str(error)
+
+    def corrupt(self, error: CameraError) -> None:
+        """One frame was not whole and has been dropped."""
+        with self._lock:
+            self._counts.corrupt += 1
+            self._corrupt_since_last += 1
+            self._counts.faults[error.kind] += 1
+            self._last_fault = str(error)
+
+    def received(self, sequence: int, skipped: int) -> None:
+        """A whole frame came; `skipped` older ones were dropped for it."""
+        with self._lock:
+            if self._last_sequence is not None:
+                missing = sequence - self._last_sequence - 1 - skipped - self._corrupt_since_last
+                self._counts.lost_before_us += max(0, missing)
+            self._last_sequence, self._corrupt_since_last = sequence, 0
+            self._counts.skipped += skipped
+            self._arrivals_s.append(self._now_s())
+
+    def too_old(self) -> None:
+        """A frame was older than asked and has been dropped."""
+        with self._lock:
+            self._counts.too_old += 1
+
+    def published(self, stamp_to_publish_s: float) -> None:
+        """A frame has gone out, that long after its stamp."""
+        with self._lock:
+            self._counts.frames += 1
+            self._delays_s.append(stamp_to_publish_s)
+
+    def ended(self) -> None:
+        """A recording has been played to its end."""
+        with self._lock:
+            self._ended, self._connected = True, False
+
+    def snapshot(self) -> Snapshot:
+        """Return the present state."""
+        with self._lock:
+            arrivals, counts = self._arrivals_s, self._counts
+            nan = float("nan")
+            span = arrivals[-1] - arrivals[0] if len(arrivals) > 1 else 0.0
+            return Snapshot(
+                connected=self._connected,
+                ended=self._ended,
+                mode=self._mode,
+                frames=counts.frames,
+                rate_hz=(len(arrivals) - 1) / span if span > 0.0 else nan,
+                age_s=self._now_s() - arrivals[-1] if arrivals else nan,
+                stamp_to_publish_s=statistics.median(self._delays_s) if self._delays_s else nan,
+                lost_before_us=counts.lost_before_us,
+                skipped=counts.skipped,
+                too_old=counts.too_old,
+                corrupt=counts.corrupt,
+                reconnects=counts.reconnects,
+                faults=dict(counts.faults),
+                last_fault=self._last_fault,
+            )

@@ -1,0 +1,1 @@
+"""Frame sources other than V4L2: recordings, image folders and network streams."""
