@@ -62,3 +62,61 @@ class DisparityParameters(Parameters):
             raise ParameterError("disparity_box_px", box, "empty, or x_min, y_min, x_max, y_max in that order")
         if self.disparity_depth_policy == "box" and not box:
             raise ParameterError("disparity_box_px", box, "a box, because disparity_depth_policy is 'box'")
+
+
+@dataclass(frozen=True)
+class TrackerParameters(Parameters):
+    """How the class-free tracker locks, follows and gives up."""
+
+    track_saccade_deg: float = parameter(
+        4.0,
+        "a turn of the left eye by more than this within track_saccade_s is a saccade",
+        unit="deg",
+        minimum=0.5,
+        maximum=30.0,
+    )
+    track_saccade_s: float = parameter(0.1, "see track_saccade_deg", unit="s", minimum=0.02, maximum=1.0)
+    track_settle_s: float = parameter(
+        0.12, "the joints must have rested this long before the tracker locks", unit="s", minimum=0.0, maximum=2.0
+    )
+    track_rest_deg_s: float = parameter(
+        8.0, "the left eye rests below this speed", unit="deg/s", minimum=0.1, maximum=100.0
+    )
+    track_still_px: float = parameter(
+        1.5, "the fovea's image is still below this motion between frames", unit="px", minimum=0.1, maximum=20.0
+    )
+    track_still_wait_s: float = parameter(
+        0.5, "lock after this rest of the joints even if the image moves", unit="s", minimum=0.0, maximum=5.0
+    )
+    track_region_px: int = parameter(
+        110, "half side of the area in which the target's region is looked for", unit="px", minimum=20, maximum=300
+    )
+    track_snap_px: float = parameter(
+        10.0, "a region this near to the fovea still counts as lying there", unit="px", minimum=0.0, maximum=60.0
+    )
+    track_disparity_jump_px: float = parameter(
+        6.0,
+        "a disparity that differs this much from the expected one is another thing's",
+        unit="px",
+        minimum=1.0,
+        maximum=60.0,
+    )
+    track_minimum_likeness: float = parameter(
+        0.55, "correlation with the target's appearance below which it is not seen", minimum=0.1, maximum=0.95
+    )
+    track_reacquire_likeness: float = parameter(
+        0.7, "correlation with its appearance needed to take up a hidden target again", minimum=0.1, maximum=0.99
+    )
+    track_search_px: int = parameter(
+        24,
+        "half side of the search about the expected place of a hidden target, at first",
+        unit="px",
+        minimum=4,
+        maximum=200,
+    )
+    track_search_growth_px_s: float = parameter(
+        60.0, "growth of that search with the time hidden", unit="px/s", minimum=0.0, maximum=1000.0
+    )
+    track_give_up_s: float = parameter(
+        3.0, "a target hidden this long is no more searched for", unit="s", minimum=0.1, maximum=60.0
+    )

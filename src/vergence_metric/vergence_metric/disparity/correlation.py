@@ -41,12 +41,13 @@ class Texture:
 
     `deviation` is the weighted standard deviation of the grey values, `noise` that of the pixel noise in it (both in
     grey levels), `independent` the number of independent samples: the window's area over the texture's correlation
-    area, both as standard deviations of Gaussians.
+    area, both as standard deviations of Gaussians. `length` is the texture's correlation length across [px].
     """
 
     deviation: float
     noise: float
     independent: float
+    length: float
 
     @property
     def signal(self) -> float:
@@ -106,7 +107,7 @@ def texture_of(patch: NDArray[np.float32], sigma: float) -> Texture:
     along = [max(float((weights * g * g).sum()) - noise**2 / 2, floor) for g in (gx, gy)]
     signal = max(variance - noise**2, floor)
     lengths = [min(max(math.sqrt(signal / g), 1.0), 2.0 * sigma) for g in along]
-    return Texture(math.sqrt(variance), noise, 4.0 * sigma**2 / (lengths[0] * lengths[1]))
+    return Texture(math.sqrt(variance), noise, 4.0 * sigma**2 / (lengths[0] * lengths[1]), lengths[0])
 
 
 def correlate(

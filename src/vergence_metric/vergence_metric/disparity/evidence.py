@@ -1,7 +1,7 @@
 """How sure a match is, as a share of like answers that are right."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -10,7 +10,7 @@ class Evidence:
 
     `correlation` is its windowed correlation, `independent` the number of independent samples in the window, `places`
     how many shifts were tried, `rival` the best correlation of another candidate (0 if there is none) and
-    `left_right_px` how far matching back misses.
+    `left_right_px` how far matching back misses. `ceiling` is the confidence of what it rests on.
     """
 
     correlation: float
@@ -18,6 +18,7 @@ class Evidence:
     places: float
     rival: float
     left_right_px: float
+    ceiling: float = 1.0
 
     @classmethod
     def nothing(cls) -> "Evidence":
@@ -45,4 +46,8 @@ class Evidence:
         certain = 1.0 / (1.0 + math.exp(-2.0 * (self.significance - 1.5)))
         unique = 1.0 if self.correlation <= 0 else min(max(2.0 * (1.0 - self.rival / self.correlation), 0.0), 1.0)
         returns = 1.0 if self.left_right_px <= 2.0 else 0.1
-        return certain * unique * returns
+        return min(certain * unique * returns, self.ceiling)
+
+    def at_most(self, confidence: float) -> "Evidence":
+        """Return the same evidence for an answer that can be no surer than this."""
+        return replace(self, ceiling=min(self.ceiling, confidence))

@@ -2,7 +2,9 @@
 
 Small windows see the surface at the point itself and no other, but many places look alike to them; large windows are
 sure, but of whatever fills them. So the small window names the candidates that it cannot tell from its best, and each
-larger window may only choose among those. Then the answer is checked the other way, from right to left.
+larger window may only choose among those. Where only a large window is sure, it names the vicinity, in which the small
+ones look again: a small thing before a background is found beside the background. Every answer is checked the other
+way, from right to left.
 """
 
 import math
@@ -11,11 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.disparity.correlation import REACH_IN_SIGMAS, Surface, correlate, radius_of
+from vergence_metric.disparity.correlation import Surface, correlate, radius_of
 from vergence_metric.disparity.evidence import Evidence
 from vergence_metric.disparity.fovea_pair import FoveaPair, Strip
 from vergence_metric.disparity.protocol import DisparityStatus, Image
 from vergence_metric.fovea_parameters import DisparityParameters
+
+_VICINITY_PX = 24
+_HALVED_FROM_PX = 8.0  # windows of this deviation or more are searched wide at half resolution
+_REVERSE_PX = 24
+_SAME_PX = 4.0  # candidates of different windows this close are one
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,7 @@ class Match:
 def pair_about(left: Image, right: Image, point_px: tuple[float, float], parameters: DisparityParameters) -> FoveaPair:
     """Return the crops that a search about this point needs."""
     margin = radius_of(max(parameters.disparity_windows_px)) + 4
-    reach = parameters.disparity_max_px + parameters.disparity_track_px
+    reach = parameters.disparity_max_px + max(_VICINITY_PX, parameters.disparity_track_px)
     return FoveaPair(left, right, point_px, reach, parameters.disparity_max_vertical_px + 4, margin)
 
 
@@ -52,97 +59,174 @@ def find(pair: FoveaPair, parameters: DisparityParameters, expected_px: float | 
     An answer about the expected disparity is AMBIGUOUS, and keeps its figures, where another one far from it fits as
     well: who has reason to trust the expectation may use it.
     """
+    search = _Search(pair, parameters)
     if expected_px is not None and abs(expected_px) <= parameters.disparity_max_px:
-        near = _find_near(pair, parameters, expected_px)
+        near = search.near(expected_px, parameters.disparity_track_px)
         if near.sure:
-            return _against_far(pair, parameters, near)
-    return _find_wide(pair, parameters)
+            return search.against_far(near)
+    return search.wide()
 
 
-def _against_far(pair: FoveaPair, parameters: DisparityParameters, near: Match) -> Match:
-    """Look whether the window that decided would have fitted elsewhere in the whole range."""
-    surface = _wide_surface(pair, parameters, near.window_px)
-    profile = np.where(_visible(pair, surface, 2), surface.profile, -1.0)
-    own = surface.peak_near(near.horizontal_px / 2, 1)
-    away = np.abs((surface.first_d + np.arange(len(profile))) * 2 - near.horizontal_px) > parameters.disparity_track_px
-    rival = float(profile[away].max(initial=0.0))
-    if rival**2 < 1.0 - _unexplained(own[2], parameters.disparity_uniqueness):
-        return near
-    evidence = replace(near.evidence, rival=min(rival, near.evidence.correlation))
-    return replace(near, evidence=evidence, status=DisparityStatus.AMBIGUOUS, reason="another disparity fits as well")
+@dataclass(frozen=True)
+class _Layer:
+    """A surface with the full-resolution disparity of each column; `scale` is full-resolution pixels per pixel."""
+
+    surface: Surface
+    window_px: float
+    scale: int
+    profile: NDArray[np.float32]
+    visible: NDArray[np.bool_]
+
+    def disparity(self, column: int) -> int:
+        return (self.surface.first_d + column) * self.scale
+
+    def column(self, disparity: float) -> int:
+        return round(disparity / self.scale) - self.surface.first_d
 
 
-def _find_near(pair: FoveaPair, parameters: DisparityParameters, expected_px: float) -> Match:
-    left, right = pair.full
-    at = (round(pair.point_px[0]), round(pair.point_px[1]))
-    middle, half = round(expected_px), parameters.disparity_track_px
-    vertical = parameters.disparity_max_vertical_px
-    surfaces = [
-        correlate(left, right, at, sigma, (middle - half, middle + half), (-vertical, vertical))
-        for sigma in parameters.disparity_windows_px
-    ]
-    return _decide(pair, parameters, surfaces, parameters.disparity_windows_px, 1)
+class _Search:
+    def __init__(self, pair: FoveaPair, parameters: DisparityParameters) -> None:
+        self._pair, self._parameters = pair, parameters
 
+    def _layer(self, window_px: float, middle_px: float, half_px: int, scale: int) -> _Layer:
+        left, right = self._pair.full if scale == 1 else self._pair.half
+        at = (round(self._pair.point_px[0] / scale), round(self._pair.point_px[1] / scale))
+        middle, half = round(middle_px / scale), half_px // scale
+        vertical = -(-self._parameters.disparity_max_vertical_px // scale)
+        surface = correlate(left, right, at, window_px / scale, (middle - half, middle + half), (-vertical, vertical))
+        disparities = (surface.first_d + np.arange(surface.zncc.shape[1])) * scale
+        x = self._pair.point_px[0] - disparities
+        visible = (x >= 0) & (x <= self._pair.left.shape[1] - 1)
+        return _Layer(surface, window_px, scale, np.where(visible, surface.profile, -1.0), visible)
 
-def _find_wide(pair: FoveaPair, parameters: DisparityParameters) -> Match:
-    surfaces = [_wide_surface(pair, parameters, window_px) for window_px in parameters.disparity_windows_px]
-    return _decide(pair, parameters, surfaces, parameters.disparity_windows_px, 2)
+    def _wide_layer(self, window_px: float) -> _Layer:
+        reach = self._parameters.disparity_max_px
+        return self._layer(window_px, 0, reach, 1 if window_px < _HALVED_FROM_PX else 2)
 
+    def near(self, middle_px: float, half_px: int) -> Match:
+        """Search about a disparity at full resolution."""
+        # Beyond the range the crops end; a fit at the end of the range is said to be OUT_OF_RANGE.
+        return self._decide([self._layer(w, middle_px, half_px, 1) for w in self._parameters.disparity_windows_px])
 
-def _wide_surface(pair: FoveaPair, parameters: DisparityParameters, window_px: float) -> Surface:
-    left, right = pair.half
-    at = (round(pair.point_px[0] / 2), round(pair.point_px[1] / 2))
-    reach = parameters.disparity_max_px // 2
-    vertical = (parameters.disparity_max_vertical_px + 1) // 2
-    return correlate(left, right, at, window_px / 2, (-reach, reach), (-vertical, vertical))
-
-
-def _decide(
-    pair: FoveaPair,
-    parameters: DisparityParameters,
-    surfaces: list[Surface],
-    windows_px: tuple[float, ...],
-    scale: int,
-) -> Match:
-    """Let each window choose among what the smaller ones left over; `scale` is full-resolution pixels per pixel."""
-    if surfaces[-1].texture.signal < parameters.disparity_minimum_texture:
-        return _nothing(DisparityStatus.NO_TEXTURE, "too little structure at the point", windows_px[-1])
-    candidates: list[int] | None = None
-    best: Match | None = None
-    for window_px, surface in zip(windows_px, surfaces, strict=True):
-        visible = _visible(pair, surface, scale)
-        if not visible.any():
-            return _nothing(DisparityStatus.OUT_OF_RANGE, "every match would lie outside the right image", window_px)
-        profile = np.where(visible, surface.profile, -1.0)
-        candidates = _candidates(profile, candidates, parameters.disparity_uniqueness)
-        if surface.texture.signal < parameters.disparity_minimum_texture:
-            continue
-        match = _judge(pair, parameters, surface, profile, candidates, window_px, scale)
-        if match.sure:
+    def wide(self) -> Match:
+        """Search the whole range, then the vicinity of what a large window found."""
+        match = self._decide([self._wide_layer(w) for w in self._parameters.disparity_windows_px])
+        if not match.sure or match.window_px <= self._parameters.disparity_windows_px[0]:
             return match
-        if best is None or match.evidence.confidence >= best.evidence.confidence:
-            best = match
-    assert best is not None
-    return best
+        vicinity = self.near(match.horizontal_px, _VICINITY_PX)
+        if not vicinity.sure or vicinity.window_px >= match.window_px:
+            return match
+        # It can be no surer than that this is the vicinity.
+        return replace(vicinity, evidence=vicinity.evidence.at_most(match.evidence.confidence))
+
+    def against_far(self, near: Match) -> Match:
+        """Look whether the windows from the one that decided on would have fitted elsewhere in the whole range."""
+        rivals: list[int] | None = None
+        rival = 0.0
+        for window_px in self._parameters.disparity_windows_px:
+            if window_px < near.window_px:
+                continue
+            layer = self._wide_layer(window_px)
+            own = layer.surface.peak_near(near.horizontal_px / layer.scale, 2 // layer.scale)[2]
+            floor = 1.0 - _unexplained(own, self._parameters.disparity_uniqueness)
+            peaks = [
+                p
+                for p in _peaks(layer.profile)
+                if layer.profile[p] ** 2 >= floor
+                and abs(layer.disparity(p) - near.horizontal_px) > self._parameters.disparity_track_px
+                and (rivals is None or any(abs(layer.disparity(p) - r) <= _SAME_PX for r in rivals))
+            ]
+            if not peaks:
+                return near
+            rivals = [layer.disparity(p) for p in peaks]
+            rival = max(float(layer.profile[p]) for p in peaks) / max(own, 1e-3)
+        evidence = replace(near.evidence, rival=min(rival, 1.0) * near.evidence.correlation)
+        return replace(
+            near, evidence=evidence, status=DisparityStatus.AMBIGUOUS, reason="another disparity fits as well"
+        )
+
+    def _decide(self, layers: list[_Layer]) -> Match:
+        """Let each window choose among what the smaller ones left over."""
+        texture = self._parameters.disparity_minimum_texture
+        if layers[-1].surface.texture.signal < texture:
+            return _nothing(DisparityStatus.NO_TEXTURE, "too little structure at the point", layers[-1].window_px)
+        if not layers[0].visible.any():
+            reason = "every match would lie outside the right image"
+            return _nothing(DisparityStatus.OUT_OF_RANGE, reason, layers[0].window_px)
+        candidates: list[int] | None = None
+        best: Match | None = None
+        for layer in layers:
+            if layer.surface.texture.signal < texture:
+                continue
+            columns = self._candidates(layer, candidates)
+            candidates = [layer.disparity(c) for c in columns]
+            match = self._judge(layer, columns)
+            if match.sure:
+                return match
+            if best is None or match.evidence.confidence >= best.evidence.confidence:
+                best = match
+        assert best is not None
+        return best
+
+    def _candidates(self, layer: _Layer, before: list[int] | None) -> list[int]:
+        """Return the columns of the peaks that this window cannot tell from its best, best first."""
+        peaks = _peaks(layer.profile)
+        if before is not None:
+            near = [p for p in peaks if any(abs(layer.disparity(int(p)) - b) <= _SAME_PX for b in before)]
+            peaks = np.array(near, int)
+        if len(peaks) == 0:
+            return []
+        top = float(layer.profile[peaks].max())
+        floor = 1.0 - _unexplained(top, self._parameters.disparity_uniqueness)
+        kept = peaks[layer.profile[peaks] ** 2 >= floor]
+        return [int(p) for p in kept[np.argsort(-layer.profile[kept])]]
+
+    def _judge(self, layer: _Layer, columns: list[int]) -> Match:
+        """Weigh the best candidate of one window."""
+        if not columns:
+            return _nothing(DisparityStatus.NO_MATCH, "nothing in the right image fits", layer.window_px)
+        surface, scale = layer.surface, layer.scale
+        i, j, value = surface.peak_near(surface.first_d + columns[0], 0)
+        horizontal, vertical = surface.subpixel(i, j)
+        rival = max((float(layer.profile[c]) for c in columns[1:] if abs(c - i) * scale > 3), default=0.0)
+        evidence = Evidence(
+            correlation=value,
+            independent=surface.texture.independent,
+            places=float(surface.zncc.size),
+            rival=rival,
+            left_right_px=self._left_right_error(layer, i, j),
+        )
+        sigma_px = scale * deviation_px(surface, value)
+        guess = (horizontal * scale, vertical * scale, sigma_px, layer.window_px, evidence)
+        rows, width = surface.zncc.shape
+        if not evidence.beyond_chance:
+            return Match(*guess, DisparityStatus.NO_MATCH, f"the best correlation, {value:.2f}, may be chance")
+        if rival > 0.0:
+            return Match(*guess, DisparityStatus.AMBIGUOUS, f"{len(columns)} disparities fit about as well")
+        if i in (0, width - 1) or (rows > 1 and j in (0, rows - 1)):
+            return Match(*guess, DisparityStatus.OUT_OF_RANGE, "the best fit lies at the edge of the searched range")
+        if evidence.left_right_px > self._parameters.disparity_left_right_px:
+            reason = f"matching back from the right image misses by {evidence.left_right_px:.1f} px"
+            return Match(*guess, DisparityStatus.NO_MATCH, reason)
+        return Match(*guess, DisparityStatus.OK, "")
+
+    def _left_right_error(self, layer: _Layer, i: int, j: int) -> float:
+        """Match back from the right image; return how far from the point it ends, in full-resolution pixels."""
+        scale, surface, sigma = layer.scale, layer.surface, layer.window_px / layer.scale
+        left, right = self._pair.full if scale == 1 else self._pair.half
+        d, v = surface.first_d + i, surface.first_v + j
+        at = (round(self._pair.point_px[0] / scale) - d, round(self._pair.point_px[1] / scale) - v)
+        back = _reverse_range(at, d, left, right, sigma, _REVERSE_PX // scale)
+        if back is None:
+            return math.inf
+        reverse = correlate(right, left, at, sigma, back, (v - 1, v + 1), sign=1)
+        return abs(back[0] + int(reverse.profile.argmax()) - d) * float(scale)
 
 
-def _visible(pair: FoveaPair, surface: Surface, scale: int) -> NDArray[np.bool_]:
-    disparities = (surface.first_d + np.arange(surface.zncc.shape[1])) * scale
-    x = pair.point_px[0] - disparities
-    return (x >= 0) & (x <= pair.left.shape[1] - 1)
-
-
-def _candidates(profile: NDArray[np.float32], before: list[int] | None, uniqueness: float) -> list[int]:
-    """Return the columns of the peaks that this window cannot tell from its best, best first."""
+def _peaks(profile: NDArray[np.float32]) -> NDArray[np.intp]:
+    """Return the columns of the positive local maxima."""
     padded = np.pad(profile, 1, constant_values=-2.0)
-    peaks = np.flatnonzero((profile >= padded[:-2]) & (profile >= padded[2:]) & (profile > 0.0))
-    if before is not None:
-        peaks = np.array([p for p in peaks if any(abs(p - b) <= 2 for b in before)], int)
-    if len(peaks) == 0:
-        return [] if before is None else before
-    top = float(profile[peaks].max())
-    kept = peaks[profile[peaks] ** 2 >= 1.0 - _unexplained(top, uniqueness)]
-    return [int(p) for p in kept[np.argsort(-profile[kept])]]
+    return np.flatnonzero((profile >= padded[:-2]) & (profile >= padded[2:]) & (profile > 0.0))
 
 
 def _unexplained(correlation: float, uniqueness: float) -> float:
@@ -153,81 +237,25 @@ def _unexplained(correlation: float, uniqueness: float) -> float:
     return (1.0 - correlation**2) * 1.3 + (1.0 - uniqueness**2)
 
 
-def _judge(
-    pair: FoveaPair,
-    parameters: DisparityParameters,
-    surface: Surface,
-    profile: NDArray[np.float32],
-    candidates: list[int],
-    window_px: float,
-    scale: int,
-) -> Match:
-    """Weigh the best candidate of one window."""
-    if not candidates:
-        return _nothing(DisparityStatus.NO_MATCH, "nothing in the right image fits", window_px)
-    i, j, value = surface.peak_near(surface.first_d + candidates[0], 0)
-    horizontal, vertical = surface.subpixel(i, j)
-    rival = max((float(profile[c]) for c in candidates[1:] if abs(c - i) * scale > 3), default=0.0)
-    returned = _left_right_error(pair, surface, i, j, window_px, scale, parameters)
-    evidence = Evidence(
-        correlation=value,
-        independent=surface.texture.independent,
-        places=float(surface.zncc.size),
-        rival=rival,
-        left_right_px=returned,
-    )
-    sigma_px = scale * deviation_px(surface, value)
-    guess = (horizontal * scale, vertical * scale, sigma_px, window_px, evidence)
-    rows, columns = surface.zncc.shape
-    if not evidence.beyond_chance:
-        return Match(*guess, DisparityStatus.NO_MATCH, f"the best correlation, {value:.2f}, may be chance")
-    if len(candidates) > 1:
-        return Match(*guess, DisparityStatus.AMBIGUOUS, f"{len(candidates)} disparities fit about as well")
-    if i in (0, columns - 1) or (rows > 1 and j in (0, rows - 1)):
-        return Match(*guess, DisparityStatus.OUT_OF_RANGE, "the best fit lies at the edge of the searched range")
-    if returned > parameters.disparity_left_right_px:
-        return Match(
-            *guess, DisparityStatus.NO_MATCH, f"matching back from the right image misses by {returned:.1f} px"
-        )
-    return Match(*guess, DisparityStatus.OK, "")
-
-
 def deviation_px(surface: Surface, correlation: float) -> float:
     """Return the standard deviation of a correlation peak's place, in pixels of the surface's resolution.
 
-    What the match leaves unexplained is taken as white noise over the window; the texture's correlation length follows
-    from its number of independent samples (Cramer-Rao bound for a shift).
+    What the match leaves unexplained is taken as white noise in the window's independent samples, over the texture's
+    correlation length (Cramer-Rao bound of a shift).
     """
-    signal = max(surface.texture.signal, 1e-3)
-    unexplained = math.sqrt(max(1.0 - correlation**2, 1e-4))
-    length = max(2.0 / math.sqrt(max(surface.texture.independent, 1e-3)), 1e-3)
-    radius = radius_of(1.0) / REACH_IN_SIGMAS
-    return float(unexplained * length * radius * surface.texture.deviation / signal / 2.0)
-
-
-def _left_right_error(
-    pair: FoveaPair, surface: Surface, i: int, j: int, window_px: float, scale: int, parameters: DisparityParameters
-) -> float:
-    """Match back from the right image over the same range; return how far from the point it ends, in full pixels."""
-    left, right = (pair.full, pair.half)[scale - 1]
-    d, v = surface.first_d + i, surface.first_v + j
-    at = (round(pair.point_px[0] / scale) - d, round(pair.point_px[1] / scale) - v)
-    back = _reverse_range(pair, at, d, surface, left, right, window_px / scale)
-    if back is None:
-        return math.inf
-    reverse = correlate(right, left, at, window_px / scale, back, (v - 1, v + 1), sign=1)
-    column = int(reverse.profile.argmax())
-    return abs(back[0] + column - d) * float(scale)
+    independent = max(surface.texture.independent, 1e-3)
+    unexplained = math.sqrt(max(1.0 - correlation**2, 1e-4)) / max(correlation, 0.1)
+    length = surface.texture.length
+    return float(unexplained * length / math.sqrt(max(independent, 1.0)))
 
 
 def _reverse_range(
-    pair: FoveaPair, at: tuple[int, int], d: int, surface: Surface, left: Strip, right: Strip, sigma: float
+    at: tuple[int, int], d: int, left: Strip, right: Strip, sigma: float, half: int
 ) -> tuple[int, int] | None:
-    """Return the range of disparities whose left windows lie inside the crop, at most the forward range's width."""
+    """Return the range of disparities about d whose left windows lie inside the crop; None if d's own does not."""
     radius = radius_of(sigma)
     if at[0] - right.x0 < radius or at[0] - right.x0 + radius >= right.grey.shape[1]:
         return None
-    half = min(surface.zncc.shape[1] // 2, 12)
     low = max(d - half, int(left.x0) + radius - at[0])
     high = min(d + half, int(left.x0) + left.grey.shape[1] - 1 - radius - at[0])
     return (low, high) if low <= d <= high else None

@@ -1,0 +1,333 @@
+"""The class-free tracker: what the left eye came to rest on, followed from pair to pair without a detector.
+
+When the eyes come to rest after a saccade, whatever lies at the left fovea is locked on: its region is what shares the
+fovea's disparity (zero-disparity filter), its looks are learnt. From then on sparse flow and templates follow it in the
+left image, wherever it goes, and the disparity estimator reads its disparity there. Looks and disparity must both go on
+as expected: something that passes in front has another disparity and is not followed; the target is then searched for
+about the direction it is predicted in until it shows again.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+import numpy as np
+
+from vergence_metric.appearance import Appearance, Sighting
+from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
+from vergence_metric.eye_watch import EyeView, EyeWatch, Pixel
+from vergence_metric.fovea_parameters import TrackerParameters
+from vergence_metric.zero_disparity import ZeroDisparity, zero_disparity
+from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import EyeAngles
+
+_NOWHERE: Pixel = (math.nan, math.nan)
+_MOTION_MEMORY = 0.6  # share of the old angular velocity kept at each frame
+_COAST_HALF_LIFE_S = 0.7  # a hidden target's predicted velocity fades: it may have stopped
+_DISTRUST_WITHOUT_DISPARITY = 0.6
+_USUAL_DEPTH_M = 0.06
+
+
+class TrackStatus(IntEnum):
+    """The numbers are those of TargetTrack.msg."""
+
+    OK = 0
+    LOCKING = 1
+    LOST = 2
+    OCCLUDED = 3
+    UNLOCKED = 4
+
+
+@dataclass(frozen=True)
+class Track:
+    """Where the target is; the fields are those of TargetTrack.msg, NaN where unknown.
+
+    `left_px`, `right_px` (x, y) in the images given, `disparity_px` = x_left - x_right, `extent_px` (width, height) of
+    the region locked on at its present scale. `confidence` is the likeness of the target to itself, lowered where its
+    disparity could not be confirmed.
+    """
+
+    track_id: int
+    lock_stamp_s: float
+    left_px: Pixel
+    right_px: Pixel
+    disparity_px: float
+    vertical_px: float
+    sigma_px: float
+    extent_px: tuple[float, float]
+    confidence: float
+    status: TrackStatus
+    reason: str
+
+
+class TargetTracker:
+    """Stateful; give it every pair in order of their stamps."""
+
+    def __init__(
+        self,
+        parameters: TrackerParameters,
+        estimator: DisparityEstimator,
+        left_camera: CameraModel,
+        right_camera: CameraModel,
+        baseline_m: float,
+    ) -> None:
+        self._parameters = parameters
+        self._baseline_m = baseline_m
+        self._estimator = estimator
+        self._cameras = (left_camera, right_camera)
+        self._track_id = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the target and the eyes' motion; the next lock has a new id."""
+        self._watch = EyeWatch(self._parameters)
+        self._target: _Target | None = None
+        self._wants_lock = True
+        self._stamp_s = -math.inf
+        self._still_patch: Image | None = None
+
+    def lock_here(self) -> None:
+        """Lock anew on what lies at the fovea as soon as the eyes rest, as after a saccade."""
+        self._target, self._wants_lock = None, True
+
+    def update(self, left: Image, right: Image, stamp_s: float, eyes: EyeAngles) -> Track:
+        """Take a pair and say where the target is.
+
+        Args:
+            left: (h, w) grey image of the left eye.
+            right: (h, w) grey image of the right eye, aligned.
+            stamp_s: of the left image; one that is not later than the last resets the tracker.
+            eyes: joint angles, of the left eye and the tilt at the left stamp, of the right eye at the right stamp.
+
+        """
+        if stamp_s <= self._stamp_s:
+            self.reset()
+        state = self._watch.update(stamp_s, eyes)
+        views = (
+            EyeView(self._cameras[0], eyes.pan_left_rad, eyes.tilt_rad),
+            EyeView(self._cameras[1], eyes.pan_right_rad, eyes.tilt_rad),
+        )
+        still = self._is_still(left)
+        self._stamp_s = stamp_s
+        if state.saccading:
+            self._target, self._wants_lock = None, True
+            return self._without(TrackStatus.LOCKING, "the left eye is in a saccade")
+        if self._target is not None:
+            return self._follow(self._target, left, right, stamp_s, views)
+        if not self._wants_lock:
+            return self._without(TrackStatus.LOST, "the target was hidden too long; waiting for a saccade")
+        p = self._parameters
+        if state.rested_s < p.track_settle_s or (not still and state.rested_s < p.track_still_wait_s):
+            return self._without(TrackStatus.LOCKING, "the eyes came to rest just now")
+        return self._lock(left, right, stamp_s, views)
+
+    def _without(self, status: TrackStatus, reason: str) -> Track:
+        nan = math.nan
+        return Track(self._track_id, nan, _NOWHERE, _NOWHERE, nan, nan, nan, (nan, nan), 0.0, status, reason)
+
+    def _is_still(self, left: Image) -> bool:
+        """Tell whether the fovea's image has stayed where it was since the last frame."""
+        h, w = left.shape
+        half = min(40, h // 4, w // 4)
+        patch = left[h // 2 - half : h // 2 + half, w // 2 - half : w // 2 + half]
+        before, self._still_patch = self._still_patch, patch.copy()
+        if before is None or before.shape != patch.shape:
+            return False
+        look = Appearance(before, ((half * 2 - 1) / 2, (half * 2 - 1) / 2), (half, half))
+        seen = look.search(patch, look.pixel, 8)
+        moved = math.hypot(seen.pixel[0] - look.pixel[0], seen.pixel[1] - look.pixel[1])
+        return moved <= self._parameters.track_still_px
+
+    def _lock(self, left: Image, right: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Track:
+        """Lock on what lies at the fovea."""
+        h, w = left.shape
+        fovea = ((w - 1) / 2, (h - 1) / 2)
+        disparity = self._estimator.estimate(left, right, fovea)
+        if disparity.status is DisparityStatus.NO_TEXTURE:
+            return self._without(TrackStatus.UNLOCKED, "nothing at the fovea to lock on")
+        point, extent = fovea, (60.0, 60.0)
+        if disparity.ok:
+            region = self._region(left, right, fovea, disparity, views)
+            if region.found and not region.touches_border:
+                point, extent = region.centroid_px, region.extent_px
+                if point != fovea:
+                    disparity = self._better(left, right, point, disparity)
+        self._track_id += 1
+        self._wants_lock = False
+        looks = Appearance(left, point, extent)
+        self._target = _Target(self._track_id, stamp_s, looks, stamp_s, views[0].direction(point), np.zeros(3))
+        return self._tell(self._target, Sighting(point, 1.0, 0), disparity, views)
+
+    def _region(
+        self, left: Image, right: Image, fovea: Pixel, disparity: Disparity, views: tuple[EyeView, EyeView]
+    ) -> ZeroDisparity:
+        p = self._parameters
+        return zero_disparity(
+            left,
+            right,
+            fovea,
+            (disparity.horizontal_px, disparity.vertical_px),
+            _tolerance_px(disparity.horizontal_px, views, self._baseline_m),
+            p.track_region_px,
+            p.track_snap_px,
+        )
+
+    def _better(self, left: Image, right: Image, point: Pixel, disparity: Disparity) -> Disparity:
+        at_point = self._estimator.estimate(left, right, point, disparity.horizontal_px)
+        return at_point if _plausible(at_point, disparity.horizontal_px, 1e9) else disparity
+
+    def _follow(
+        self, target: "_Target", left: Image, right: Image, stamp_s: float, views: tuple[EyeView, EyeView]
+    ) -> Track:
+        """Find the target again in the next pair."""
+        p = self._parameters
+        expected_px = views[0].pixel(target.predicted(stamp_s))
+        hidden_s = stamp_s - target.seen_s if target.hidden else 0.0
+        if hidden_s > p.track_give_up_s:
+            self._target = None
+            return self._without(TrackStatus.LOST, f"not seen for {hidden_s:.1f} s")
+        if not _inside(expected_px, left):
+            target.hidden = True
+            return self._lost(target, f"predicted outside the left image, hidden for {hidden_s:.1f} s")
+        if target.hidden:
+            reach = round(p.track_search_px + p.track_search_growth_px_s * hidden_s)
+            sighting = target.looks.search(left, expected_px, reach)
+            needed = p.track_reacquire_likeness
+        else:
+            sighting = target.looks.follow(left, expected_px)
+            needed = p.track_minimum_likeness
+        if sighting.likeness < needed or not _inside(sighting.pixel, left):
+            target.hidden = True
+            return self._lost(target, f"hidden for {hidden_s:.1f} s, best likeness {sighting.likeness:.2f}")
+        expected_d = target.expected_disparity(sighting.pixel, views)
+        disparity = self._estimator.estimate(left, right, sighting.pixel, expected_d)
+        if disparity.ok and expected_d is not None and target.disparity_age_s(stamp_s) < 0.5:
+            jump = disparity.horizontal_px - expected_d
+            if abs(jump) > p.track_disparity_jump_px:
+                target.hidden = True
+                return self._lost(target, f"what is seen there has another disparity, by {jump:+.1f} px")
+        target.looks.accept(left, sighting, renew=disparity.ok)
+        target.moved(stamp_s, views[0].direction(sighting.pixel))
+        return self._tell(target, sighting, disparity, views)
+
+    def _lost(self, target: "_Target", reason: str) -> Track:
+        return replace(self._without(TrackStatus.LOST, reason), lock_stamp_s=target.lock_stamp_s)
+
+    def _tell(
+        self, target: "_Target", sighting: Sighting, disparity: Disparity, views: tuple[EyeView, EyeView]
+    ) -> Track:
+        """Return the track of a target that was seen in the left eye."""
+        expected_d = target.expected_disparity(sighting.pixel, views)
+        usable = _plausible(disparity, expected_d, self._parameters.track_disparity_jump_px)
+        likeness = min(max((sighting.likeness - 0.3) / 0.6, 0.0), 1.0)
+        scale = target.looks.scale
+        extent = (target.looks.extent_px[0] * scale, target.looks.extent_px[1] * scale)
+        seen = Track(
+            target.track_id,
+            target.lock_stamp_s,
+            sighting.pixel,
+            _NOWHERE,
+            math.nan,
+            math.nan,
+            math.nan,
+            extent,
+            likeness * _DISTRUST_WITHOUT_DISPARITY,
+            TrackStatus.OCCLUDED,
+            f"not found in the right eye: {disparity.reason}",
+        )
+        if not usable:
+            return seen
+        right_px = (sighting.pixel[0] - disparity.horizontal_px, sighting.pixel[1] - disparity.vertical_px)
+        target.saw_right(self._stamp_s, sighting.pixel, views, right_px)
+        return replace(
+            seen,
+            right_px=right_px,
+            disparity_px=disparity.horizontal_px,
+            vertical_px=disparity.vertical_px,
+            sigma_px=disparity.sigma_px,
+            confidence=likeness * (1.0 if disparity.ok else 0.8),
+            status=TrackStatus.OK,
+            reason="" if disparity.ok else disparity.reason,
+        )
+
+
+@dataclass
+class _Target:
+    """What is known of the locked target."""
+
+    track_id: int
+    lock_stamp_s: float
+    looks: Appearance
+    seen_s: float
+    direction: np.ndarray  # unit vector in rig_base when last seen
+    velocity: np.ndarray  # of that vector, per second
+    hidden: bool = False
+    right_seen_s: float = -math.inf
+    absolute_rad: float = math.nan  # angle by which the right ray is turned against the left one, across
+
+    def predicted(self, stamp_s: float) -> np.ndarray:
+        """Return the direction (3,) in which it should be seen now."""
+        elapsed = stamp_s - self.seen_s
+        rate = math.log(2.0) / _COAST_HALF_LIFE_S
+        travelled = elapsed if not self.hidden else (1.0 - math.exp(-rate * elapsed)) / rate
+        direction = self.direction + self.velocity * travelled
+        return np.asarray(direction / np.linalg.norm(direction))
+
+    def moved(self, stamp_s: float, direction: np.ndarray) -> None:
+        """Take where it is seen now."""
+        elapsed = stamp_s - self.seen_s
+        if elapsed > 0.0:
+            velocity = (direction - self.direction) / elapsed
+            keep = _MOTION_MEMORY if not self.hidden else 0.0
+            self.velocity = keep * self.velocity + (1.0 - keep) * velocity if not self.hidden else self.velocity * 0.0
+        self.direction, self.seen_s, self.hidden = direction, stamp_s, False
+
+    def saw_right(self, stamp_s: float, left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> None:
+        """Keep its parallax, the angle between the two eyes' rays, which changes slowly whatever the eyes do."""
+        self.right_seen_s = stamp_s
+        self.absolute_rad = _across(views[1].direction(right_px)) - _across(views[0].direction(left_px))
+
+    def disparity_age_s(self, stamp_s: float) -> float:
+        """Return how long ago it was last seen in the right eye."""
+        return stamp_s - self.right_seen_s
+
+    def expected_disparity(self, left_px: Pixel, views: tuple[EyeView, EyeView]) -> float | None:
+        """Return the disparity it should have at a left pixel with the eyes as they are, None if never measured."""
+        if math.isnan(self.absolute_rad):
+            return None
+        left = views[0].direction(left_px)
+        angle = _across(left) + self.absolute_rad
+        # Same elevation about the baseline, turned across by the parallax.
+        forward = left * np.array([1.0, 0.0, 1.0])
+        forward /= np.linalg.norm(forward)
+        right = forward * math.cos(angle) + np.array([0.0, math.sin(angle), 0.0])
+        x = views[1].pixel(right)[0]
+        return left_px[0] - x if math.isfinite(x) else None
+
+
+def _across(direction: np.ndarray) -> float:
+    """Return a direction's angle across, towards the left, in the plane through the baseline [rad]."""
+    return math.asin(min(max(float(direction[1]), -1.0), 1.0))
+
+
+def _tolerance_px(disparity_px: float, views: tuple[EyeView, EyeView], baseline_m: float) -> int:
+    """Return by how much the disparity of a thing about as deep as wide may vary over it."""
+    f = views[0].camera.fx_px
+    parallax_rad = views[1].pan_rad - views[0].pan_rad + disparity_px / f
+    # d = f b / z, so a depth of s changes it by f b s / z^2 = d^2 s / (f b).
+    change_px = f * max(parallax_rad, 0.0) ** 2 * _USUAL_DEPTH_M / baseline_m
+    return round(min(max(0.5 * change_px, 1.0), 5.0))
+
+
+def _plausible(disparity: Disparity, expected_px: float | None, jump_px: float) -> bool:
+    """Tell whether a disparity may be the target's: a good one, or an ambiguous one where it is expected."""
+    if math.isnan(disparity.horizontal_px):
+        return False
+    if disparity.ok:
+        return True
+    near = expected_px is not None and abs(disparity.horizontal_px - expected_px) <= min(jump_px, 4.0)
+    return disparity.status is DisparityStatus.AMBIGUOUS and near
+
+
+def _inside(pixel: Pixel, image: Image) -> bool:
+    return bool(0.0 <= pixel[0] <= image.shape[1] - 1 and 0.0 <= pixel[1] <= image.shape[0] - 1)
