@@ -1,0 +1,16 @@
+"""What graph and system tests share."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from vergence_common.domains import own_domain
+
+
+@pytest.fixture
+def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A DDS domain for this test alone, whatever else runs on this machine; child processes inherit it."""
+    with own_domain() as domain:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield domain
