@@ -56,6 +56,7 @@ class ListedDevice:
     device: Device
     sizes: Sequence[OfferedSize] = ()
     trouble: str = ""
+    error: OSError | None = None
 
 
 def find_devices(tree: SystemTree | None = None) -> list[Device]:
@@ -96,14 +97,14 @@ def list_devices(kernel: Kernel, tree: SystemTree | None = None) -> list[ListedD
         try:
             descriptor = kernel.open(device.path)
         except OSError as error:
-            listed.append(ListedDevice(device, trouble=os.strerror(error.errno or 0)))
+            listed.append(ListedDevice(device, trouble=os.strerror(error.errno or 0), error=error))
             continue
         try:
             query_capture(kernel, descriptor, device.path)
             listed.append(ListedDevice(device, offered_sizes(kernel, descriptor)))
         except CameraError as error:
             if not error.permanent:
-                listed.append(ListedDevice(device, trouble=str(error)))
+                listed.append(ListedDevice(device, trouble=str(error), error=error))
         finally:
             kernel.close(descriptor)
     return listed

@@ -1,0 +1,1 @@
+"""Calibrating one camera or a pair from views of a board."""
