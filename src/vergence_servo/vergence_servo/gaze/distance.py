@@ -1,0 +1,84 @@
+"""How far the target is, and how sure that is.
+
+The shaft of a hobby servo is known only to within its dead band, play and pulse step, so the vergence that the filter
+believes in, however steady, carries that uncertainty; half a degree is 13 cm at one metre.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.geometry import GeometryError, point_at
+from vergence_rig.rig import Rig
+from vergence_servo.gaze.target_filter import TargetEstimate
+
+Array = npt.NDArray[np.float64]
+
+_TO_95_PERCENT = 1.96
+_PLAY_MODEL_SHARE = 0.35
+
+
+@dataclass(frozen=True)
+class TargetPosition:
+    """The target in rig_base (3,) [m], covariance (3, 3) [m^2], and distance with its 95 % interval [m]."""
+
+    point_m: Array
+    covariance_m2: Array
+    distance_m: float
+    low_m: float
+    high_m: float
+
+
+UNKNOWN = TargetPosition(np.full(3, math.nan), np.full((3, 3), math.nan), math.nan, math.nan, math.nan)
+
+
+def joint_variances(rig: Rig) -> Array:
+    """Return what is not known of each shaft at rest (3,) [rad^2] although its play is modelled."""
+    return np.array(
+        [
+            (_PLAY_MODEL_SHARE * 0.5 * (servo.dead_band_rad + servo.backlash_rad)) ** 2 + servo.pulse_step_rad**2 / 12.0
+            for servo in (joint.servo for _, joint in rig.joints.items())
+        ]
+    )
+
+
+def target_position(estimate: TargetEstimate, rig: Rig, shaft_variances: Array) -> TargetPosition:
+    """Return the target's position from the filter's estimate and the shafts' variances (3,) [rad^2]."""
+    left, right, tilt = shaft_variances
+    covariance = estimate.covariance.copy()
+    covariance[0, 0] += 0.25 * (left + right)
+    covariance[1, 1] += left + right
+    covariance[0, 1] += 0.5 * (right - left)
+    covariance[1, 0] += 0.5 * (right - left)
+    covariance[2, 2] += tilt
+    sigma = math.sqrt(covariance[1, 1])
+    near = estimate.vergence_rad + _TO_95_PERCENT * sigma
+    far = estimate.vergence_rad - _TO_95_PERCENT * sigma
+    low = _distance(estimate, near, rig.baseline_m)
+    high = _distance(estimate, far, rig.baseline_m)
+    try:
+        point = point_at(estimate.version_rad, estimate.vergence_rad, estimate.tilt_rad, rig.baseline_m)
+        jacobian = _jacobian(estimate, rig.baseline_m)
+    except GeometryError:
+        return TargetPosition(UNKNOWN.point_m, UNKNOWN.covariance_m2, math.inf, low, high)
+    return TargetPosition(point, jacobian @ covariance @ jacobian.T, float(np.linalg.norm(point)), low, high)
+
+
+def _distance(estimate: TargetEstimate, vergence_rad: float, baseline_m: float) -> float:
+    try:
+        return float(np.linalg.norm(point_at(estimate.version_rad, vergence_rad, estimate.tilt_rad, baseline_m)))
+    except GeometryError:
+        return math.inf
+
+
+def _jacobian(estimate: TargetEstimate, baseline_m: float) -> Array:
+    """Return d point / d (version, vergence, tilt), (3, 3) [m/rad]."""
+    step = min(1e-5, 0.1 * abs(estimate.vergence_rad))
+
+    def displaced(offset: Array) -> Array:
+        version, vergence, tilt = (float(angle) for angle in estimate.angles_rad + offset)
+        return point_at(version, vergence, tilt, baseline_m)
+
+    return np.column_stack([(displaced(row) - displaced(-row)) / (2.0 * step) for row in step * np.eye(3)])

@@ -1,0 +1,71 @@
+"""What the controller can be asked for, and how it can end."""
+
+import enum
+import math
+from dataclasses import dataclass
+
+
+class GoalKind(enum.IntEnum):
+    """As LookAt's constants."""
+
+    POINT = 0
+    PIXEL = 1
+    STEREO_PIXEL = 2
+    ANGLES = 3
+    RELATIVE_ANGLES = 4
+    CLASS = 5
+
+
+class Result(enum.IntEnum):
+    """As LookAt's result constants."""
+
+    VERGED = 0
+    UNREACHABLE = 1
+    LOST = 2
+    LIMITS = 3
+    NO_IMAGES = 4
+    DISAGREEMENT = 5
+    PREEMPTED = 6
+    CANCELLED = 7
+    TIMED_OUT = 8
+    INVALID = 9
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One request. Pixels come as normalised, undistorted coordinates (x right, y down), points in rig_base.
+
+    `stamp_s` is the stamp of the image that pixels were read from; NaN for the newest. `depth_m` is along the eye's
+    ray, NaN if unknown. `left_eye` says which eye a single pixel is of.
+    """
+
+    kind: GoalKind
+    point_m: tuple[float, float, float] = (math.nan, math.nan, math.nan)
+    left_eye: bool = True
+    left_xy: tuple[float, float] = (math.nan, math.nan)
+    right_xy: tuple[float, float] = (math.nan, math.nan)
+    depth_m: float = math.nan
+    version_rad: float = math.nan
+    vergence_rad: float = math.nan
+    tilt_rad: float = math.nan
+    class_name: str = ""
+    stamp_s: float = math.nan
+    time_limit_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a goal ended."""
+
+    goal_id: int
+    result: Result
+    reason: str
+    time_s: float
+
+
+class GoalError(ValueError):
+    """A goal that cannot be begun: INVALID or UNREACHABLE, and why."""
+
+    def __init__(self, result: Result, reason: str) -> None:
+        super().__init__(reason)
+        self.result, self.reason = result, reason

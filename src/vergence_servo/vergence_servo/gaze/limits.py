@@ -1,0 +1,69 @@
+"""Safety as a pure function: from the wanted joint angles and the last command to what is really sent."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.rig import Rig
+
+Array = npt.NDArray[np.float64]
+
+LONGEST_STEP_S = 0.1
+"""A controller that slept longer than this may not make up for it in one command."""
+
+_MARGIN_RAD = 1e-9
+
+
+class CommandLimits:
+    """Joint, speed and minimum-vergence limits of one rig. Angles are (3,): pan_left, pan_right, tilt [rad]."""
+
+    def __init__(self, rig: Rig) -> None:
+        joints = [joint for _, joint in rig.joints.items()]
+        self.lower_rad = np.array([joint.lower_rad for joint in joints])
+        self.upper_rad = np.array([joint.upper_rad for joint in joints])
+        self.speed_rad_s = np.array([joint.speed_rad_s for joint in joints])
+        self.minimum_vergence_rad = rig.minimum_vergence_rad
+
+    def nearest(self, angles_rad: Array) -> Array:
+        """Return the angles nearest to `angles_rad` that the limits allow: finite ones are expected."""
+        allowed = np.clip(angles_rad, self.lower_rad, self.upper_rad)
+        lacking = self.minimum_vergence_rad + _MARGIN_RAD - (allowed[1] - allowed[0])
+        if lacking > 0:
+            allowed[0] = max(allowed[0] - 0.5 * lacking, self.lower_rad[0])
+            allowed[1] = min(allowed[0] + self.minimum_vergence_rad + _MARGIN_RAD, self.upper_rad[1])
+            allowed[0] = min(allowed[0], allowed[1] - self.minimum_vergence_rad - _MARGIN_RAD)
+        return allowed
+
+    def allows(self, angles_rad: Array, tolerance_rad: float = 1e-12) -> bool:
+        """Tell whether the joint and vergence limits hold."""
+        return bool(
+            np.isfinite(angles_rad).all()
+            and (angles_rad >= self.lower_rad - tolerance_rad).all()
+            and (angles_rad <= self.upper_rad + tolerance_rad).all()
+            and angles_rad[1] - angles_rad[0] >= self.minimum_vergence_rad - tolerance_rad
+        )
+
+    def sent(self, wanted_rad: Array, last_rad: Array | None, elapsed_s: float, present_rad: Array) -> Array:
+        """Return the command (3,) that is sent.
+
+        Args:
+            wanted_rad: what the law wants (3,); joints that are not finite stay where they are.
+            last_rad: the last command sent, or None before the first, which is the nearest allowed to `present_rad`.
+            elapsed_s: time since the last command; nothing moves if it is not a positive number.
+            present_rad: where the joints are reported (3,), finite.
+        """
+        if last_rad is None:
+            return self.nearest(present_rad)
+        if not (math.isfinite(elapsed_s) and elapsed_s > 0):
+            return last_rad
+        wanted = self.nearest(np.where(np.isfinite(wanted_rad), wanted_rad, last_rad))
+        reach = self.speed_rad_s * min(elapsed_s, LONGEST_STEP_S)
+        move = np.clip(wanted - last_rad, -reach, reach)
+        # The pans may arrive one after the other; a common fraction of the move keeps to the vergence limit on the way.
+        room = last_rad[1] - last_rad[0] - self.minimum_vergence_rad
+        closing = move[0] - move[1]
+        if closing > room:
+            move[:2] *= max(room, 0.0) / closing
+        sent: Array = np.clip(last_rad + move, self.lower_rad, self.upper_rad)
+        return sent

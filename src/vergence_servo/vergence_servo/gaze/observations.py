@@ -1,0 +1,94 @@
+"""What the controller is told: joints, disparities, tracks, boxes, points. Times are seconds of one clock.
+
+Normalised image coordinates are undistorted x/z, y/z in the eye's optical frame (x right, y down). Values that are not
+known are NaN.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+
+@dataclass(frozen=True)
+class JointReport:
+    """Joint positions [rad] by name, as published at `stamp_s`."""
+
+    stamp_s: float
+    positions_rad: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class FoveaDisparity:
+    """Signed disparity at the left image's centre, atan(x_left) - atan(x_right) [rad]; `usable` if it was measured."""
+
+    stamp_s: float
+    skew_s: float
+    horizontal_rad: float
+    sigma_rad: float
+    confidence: float
+    usable: bool
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class TrackSighting:
+    """Where the class-free tracker has its target: normalised left coordinates and disparity.
+
+    `disparity_rad` is NaN while the right eye does not see it; `usable` is False while locking or lost.
+    """
+
+    stamp_s: float
+    skew_s: float
+    track_id: int
+    lock_stamp_s: float
+    left_x: float
+    left_y: float
+    disparity_rad: float
+    sigma_rad: float
+    extent_rad: float
+    usable: bool
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class BoxSighting:
+    """The detected target: its direction in each eye [rad] (right positive, down positive), NaN where unseen.
+
+    `surface_disparity_rad` is the refined disparity of the surface inside the boxes, NaN if not refined;
+    `extent_rad` is the angular width of the left box.
+    """
+
+    stamp_s: float
+    skew_s: float
+    left_azimuth_rad: float
+    left_elevation_rad: float
+    right_azimuth_rad: float
+    right_elevation_rad: float
+    surface_disparity_rad: float
+    sigma_rad: float
+    extent_rad: float
+    class_name: str
+    usable: bool
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class PointSighting:
+    """A target point in rig_base (x, y, z) [m] with the standard deviation of its direction [rad]."""
+
+    stamp_s: float
+    point_m: tuple[float, float, float]
+    sigma_rad: float
+
+
+@dataclass(frozen=True)
+class EdgeJudgement:
+    """Metric I as the judge sees it: contrast in its window, the metric node's own verdict, and the raw metric [px]."""
+
+    stamp_s: float
+    contrast: float
+    metric_px: float
+    verged: bool
+
+
+Observation: TypeAlias = JointReport | FoveaDisparity | TrackSighting | BoxSighting | PointSighting | EdgeJudgement

@@ -1,0 +1,50 @@
+"""Where to look for a target that is out of view: overlapping fields of view over all that the eyes can reach."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.rig import Rig
+
+Array = npt.NDArray[np.float64]
+
+_OVERLAP = 0.75
+
+
+class SearchPattern:
+    """Visits (version, tilt) places, the nearest to where the target was last first, and then each in turn again."""
+
+    def __init__(self, rig: Rig, tilt_enabled: bool, vergence_rad: float) -> None:
+        camera = rig.left_camera
+        width_rad = 2.0 * math.atan(0.5 * camera.width_px / camera.fx_px) * _OVERLAP
+        height_rad = 2.0 * math.atan(0.5 * camera.height_px / camera.fy_px) * _OVERLAP
+        left, right, tilt = rig.pan_left, rig.pan_right, rig.tilt
+        lowest = max(left.lower_rad, right.lower_rad) + 0.5 * vergence_rad
+        highest = min(left.upper_rad, right.upper_rad) - 0.5 * vergence_rad
+        versions = _places(lowest, highest, width_rad)
+        tilts = _places(tilt.lower_rad, tilt.upper_rad, height_rad) if tilt_enabled else [math.nan]
+        self._places = [(version, tilt_rad) for tilt_rad in tilts for version in versions]
+        self._unvisited = list(self._places)
+
+    def next(self, version_rad: float, tilt_rad: float) -> tuple[float, float]:
+        """Return the nearest place (version, tilt) [rad] not yet visited; tilt is NaN where it is not to move."""
+        if not self._unvisited:
+            self._unvisited = list(self._places)
+
+        def distance(place: tuple[float, float]) -> float:
+            away_tilt = 0.0 if math.isnan(place[1]) else place[1] - tilt_rad
+            return max(abs(place[0] - version_rad), 2.0 * abs(away_tilt))
+
+        nearest = min(self._unvisited, key=distance)
+        self._unvisited.remove(nearest)
+        return nearest
+
+
+def _places(lowest: float, highest: float, field_rad: float) -> list[float]:
+    """Centres of fields of view that together cover from half a field's edge below to above the limits."""
+    count = max(1, math.ceil((highest - lowest) / field_rad))
+    if count == 1:
+        return [0.5 * (lowest + highest)]
+    margin = 0.5 * field_rad
+    return [float(place) for place in np.linspace(lowest + margin, highest - margin, count)]
