@@ -1,25 +1,34 @@
 """The edge metric of a stereo pair in one call: what the node and `vergence measure` share."""
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.edge_distance import EdgeDistances, edge_distances
+from vergence_metric.chance import chance_levels
+from vergence_metric.contrast import contrasts
+from vergence_metric.edge_distance import edge_distances
 from vergence_metric.edge_parameters import EdgeMetricParameters
 from vergence_metric.edges import Edges, Grey, ImageShapeError, detect_edges, to_grey
 from vergence_metric.nearest_edges import NearestEdges
+from vergence_metric.oriented_edges import oriented_field
+from vergence_metric.robust import robust_distances
 from vergence_metric.windows import Window, centre_windows
+
+Figures = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class EdgeMetricResult:
     """Everything measured on one pair; element i of each array belongs to `windows[i]`.
 
-    `left_grey` and `right_grey` (h, w) uint8 are what was compared: the right one is already aligned. `stage_s` holds
-    the seconds each stage took.
+    `left_grey` and `right_grey` (h, w) uint8 are what was compared: the right one is already aligned. Arrays carry the
+    names of vergence_msgs/EdgeVergence; figures are float64 and NaN where `status` (WindowStatus) says why. `stage_s`
+    holds the seconds that each stage took.
     """
 
     windows: tuple[Window, ...]
@@ -27,28 +36,24 @@ class EdgeMetricResult:
     right_grey: Grey
     left_edges: Edges
     right_edges: Edges
-    distances: EdgeDistances
+    left_to_right_px: Figures
+    right_to_left_px: Figures
+    left_edge_count: NDArray[np.int64]
+    right_edge_count: NDArray[np.int64]
+    chance_left_to_right_px: Figures
+    chance_right_to_left_px: Figures
+    contrast_left_to_right: Figures
+    contrast_right_to_left: Figures
+    contrast: Figures
+    robust_left_to_right_px: Figures
+    robust_right_to_left_px: Figures
+    status: NDArray[np.uint8]
     stage_s: dict[str, float] = field(default_factory=dict)
 
     @property
     def windows_px(self) -> NDArray[np.uint32]:
         """Sides of the windows as asked for [px]."""
         return np.array([window.size_px for window in self.windows], np.uint32)
-
-    @property
-    def left_to_right_px(self) -> NDArray[np.float64]:
-        """The paper's metric over left edge pixels [px]."""
-        return self.distances.left_to_right_px
-
-    @property
-    def right_to_left_px(self) -> NDArray[np.float64]:
-        """The paper's metric over right edge pixels [px]."""
-        return self.distances.right_to_left_px
-
-    @property
-    def status(self) -> NDArray[np.uint8]:
-        """WindowStatus of each window."""
-        return self.distances.status
 
 
 class EdgeMetric:
@@ -64,12 +69,53 @@ class EdgeMetric:
         """
         if left.shape[:2] != right.shape[:2]:
             raise ImageShapeError(f"left image is {left.shape[:2]}, right is {right.shape[:2]}: they must be alike")
-        started = time.perf_counter()
-        left_grey, right_grey = to_grey(left), to_grey(right)
-        left_edges = detect_edges(left_grey, self.parameters)
-        right_edges = detect_edges(right_grey, self.parameters)
-        edges_done = time.perf_counter()
-        windows = centre_windows(self.parameters.windows_px, *left_grey.shape)
-        distances = edge_distances(NearestEdges(left_edges.mask, right_edges.mask, windows))
-        stage_s = {"edges": edges_done - started, "distance": time.perf_counter() - edges_done}
-        return EdgeMetricResult(windows, left_grey, right_grey, left_edges, right_edges, distances, stage_s)
+        p, stage_s = self.parameters, dict[str, float]()
+        with _timed(stage_s, "grey"):
+            left_grey, right_grey = to_grey(left), to_grey(right)
+        with _timed(stage_s, "edges"):
+            left_edges, right_edges = detect_edges(left_grey, p), detect_edges(right_grey, p)
+        windows = centre_windows(p.windows_px, *left_grey.shape)
+        with _timed(stage_s, "distance"):
+            nearest = NearestEdges(left_edges.mask, right_edges.mask, windows)
+            distances = edge_distances(nearest)
+        with _timed(stage_s, "chance"):
+            chance = chance_levels(nearest)
+        with _timed(stage_s, "contrast"):
+            oriented = oriented_field(
+                left_edges,
+                right_edges,
+                windows,
+                bins=p.orientation_bins,
+                signed=p.orientation_signed,
+                truncation_px=max(p.contrast_truncation_px, p.robust_truncation_px),
+            )
+            contrast = contrasts(oriented, p.contrast_truncation_px)
+            robust_left, robust_right = robust_distances(oriented, p.robust_truncation_px, p.fovea_sigma_px)
+        rank = np.argsort(np.argsort([window.size_px for window in windows]))  # oriented figures are sorted by size
+        return EdgeMetricResult(
+            windows,
+            left_grey,
+            right_grey,
+            left_edges,
+            right_edges,
+            distances.left_to_right_px,
+            distances.right_to_left_px,
+            distances.left_count,
+            distances.right_count,
+            chance.left_to_right_px,
+            chance.right_to_left_px,
+            contrast.left_to_right[rank],
+            contrast.right_to_left[rank],
+            contrast.both[rank],
+            robust_left[rank],
+            robust_right[rank],
+            distances.status,
+            stage_s,
+        )
+
+
+@contextmanager
+def _timed(stage_s: dict[str, float], name: str) -> Iterator[None]:
+    started = time.perf_counter()
+    yield
+    stage_s[name] = time.perf_counter() - started

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from vergence_rig.parameters import ParameterError, Parameters, parameter
 
+MOST_BINS = 8
+LARGEST_TRUNCATION_PX = 15
 EDGE_METHODS = ("auto", "fixed")
 ALIGN_MODES = ("none", "calibrated", "auto")
 
@@ -39,6 +41,21 @@ class EdgeMetricParameters(Parameters):
         unit="grey levels",
         minimum=0.0,
         maximum=4000.0,
+    )
+    orientation_bins: int = parameter(
+        8, "contrast and robust form: edge directions that are told apart", minimum=1, maximum=MOST_BINS
+    )
+    orientation_signed: bool = parameter(
+        True, "contrast and robust form: tell dark-to-bright from bright-to-dark edges (directions over 360 degrees)"
+    )
+    contrast_truncation_px: int = parameter(
+        5, "contrast: no distance counts for more", unit="px", minimum=2, maximum=LARGEST_TRUNCATION_PX
+    )
+    robust_truncation_px: int = parameter(
+        5, "robust form: no distance counts for more", unit="px", minimum=2, maximum=LARGEST_TRUNCATION_PX
+    )
+    fovea_sigma_px: float = parameter(
+        20.0, "robust form: Gaussian weight of edge pixels around the image centre", unit="px", minimum=1.0
     )
 
     def check(self) -> None:

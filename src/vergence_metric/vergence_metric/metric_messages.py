@@ -15,22 +15,21 @@ from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
 
 def edge_message(result: EdgeMetricResult, header: Header, pair_skew_s: float) -> EdgeVergence:
     """Return metric I of a pair; `header` is the left image's."""
-    nothing = np.full(len(result.windows), math.nan)
     return EdgeVergence(
         header=header,
         pair_skew_s=pair_skew_s,
         windows_px=result.windows_px,
         left_to_right_px=result.left_to_right_px,
         right_to_left_px=result.right_to_left_px,
-        left_edge_count=result.distances.left_count.astype(np.uint32),
-        right_edge_count=result.distances.right_count.astype(np.uint32),
-        chance_left_to_right_px=nothing,
-        chance_right_to_left_px=nothing,
-        contrast_left_to_right=nothing,
-        contrast_right_to_left=nothing,
-        contrast=nothing,
-        robust_left_to_right_px=nothing,
-        robust_right_to_left_px=nothing,
+        left_edge_count=result.left_edge_count.astype(np.uint32),
+        right_edge_count=result.right_edge_count.astype(np.uint32),
+        chance_left_to_right_px=result.chance_left_to_right_px,
+        chance_right_to_left_px=result.chance_right_to_left_px,
+        contrast_left_to_right=result.contrast_left_to_right,
+        contrast_right_to_left=result.contrast_right_to_left,
+        contrast=result.contrast,
+        robust_left_to_right_px=result.robust_left_to_right_px,
+        robust_right_to_left_px=result.robust_right_to_left_px,
         status=result.status,
         align_mode="none",
         align_vertical_px=math.nan,

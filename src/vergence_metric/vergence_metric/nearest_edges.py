@@ -51,6 +51,11 @@ class NearestEdges:
         rows, columns = self._inside[window]
         return np.flatnonzero(self._edges[direction, rows, columns])
 
+    def reachable(self, direction: int, window: int) -> bool:
+        """Tell whether the other image has an edge pixel in that window."""
+        rows, columns = self._inside[window]
+        return bool(self._edges[1 - direction, rows, columns].any())
+
     def squared_distances(self, points: Sequence[NDArray[np.int64]]) -> list[NDArray[Any]]:
         """Return the squared distance [px^2] from each point to the nearest edge pixel of the other image.
 

@@ -3,6 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 class WindowError(ValueError):
     """A window or an image without extent."""
@@ -36,6 +39,10 @@ class Window:
         """True where the image ends before the window does."""
         return self.height < self.size_px or self.width < self.size_px
 
+    def lattice(self, points_per_side: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return rows and columns, from the window's corner, of at most that many pixels a side, evenly spread."""
+        return _evenly(self.height, points_per_side), _evenly(self.width, points_per_side)
+
     @property
     def slices(self) -> tuple[slice, slice]:
         """Rows and columns, to index an image with."""
@@ -56,3 +63,8 @@ def centre_window(size_px: int, height_px: int, width_px: int) -> Window:
 def centre_windows(sizes_px: Iterable[int], height_px: int, width_px: int) -> tuple[Window, ...]:
     """Return one centre window per size, in the order given; raises WindowError as `centre_window` does."""
     return tuple(centre_window(size_px, height_px, width_px) for size_px in sizes_px)
+
+
+def _evenly(length: int, most: int) -> NDArray[np.int64]:
+    count = min(length, most)
+    return ((2 * np.arange(count, dtype=np.int64) + 1) * length) // (2 * count)

@@ -1,0 +1,44 @@
+"""Chance level of the edge metric: what it would read if the two edge images had nothing to do with one another.
+
+Were one image's edge pixels strewn evenly over the window, their mean distance to the other's edges would be the mean
+over all pixels of the window. It depends on how many edges there are and how they lie, not on vergence: a figure of
+6 px is good where chance is 20 px and worthless where it is 6.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence_metric.nearest_edges import NearestEdges
+from vergence_metric.windows import Window
+
+_LATTICE = 24  # points along a window's side: the mean is within 1 % of that over every pixel
+
+
+@dataclass(frozen=True)
+class ChanceLevels:
+    """Chance level in each window [px], (n,) float64; NaN where the other image has no edge pixel there."""
+
+    left_to_right_px: NDArray[np.float64]
+    right_to_left_px: NDArray[np.float64]
+
+
+def chance_levels(field: NearestEdges) -> ChanceLevels:
+    """Return the mean distance from the window's pixels to the nearest edge pixel, in every window both ways.
+
+    The mean is taken over a lattice of at most 24 by 24 pixels that lie evenly in the window.
+    """
+    n = len(field.windows)
+    lattices = [_lattice(window) for window in field.windows]
+    squares = field.squared_distances(lattices * 2)
+    means = [
+        float(np.sqrt(found, dtype=np.float64).mean()) if field.reachable(block // n, block % n) else np.nan
+        for block, found in enumerate(squares)
+    ]
+    return ChanceLevels(np.array(means[:n]), np.array(means[n:]))
+
+
+def _lattice(window: Window) -> NDArray[np.int64]:
+    rows, columns = window.lattice(_LATTICE)
+    return (rows[:, None] * window.width + columns).ravel()

@@ -1,0 +1,175 @@
+"""Edge pixels by gradient direction, and truncated distances to those of one direction.
+
+An edge pixel that finds a neighbour has found its own surface only if that neighbour's edge runs the same way. Edge
+pixels are therefore sorted into bins by the direction of their gradient, and distances are taken within a bin and cut
+off where a neighbour is too far to be the same edge.
+
+Up to eight bins share the bits of one byte a pixel. With distances cut off at a few pixels there are few different
+ones: plane i of `OrientedEdges.planes` has a bin's bit set where an edge pixel of that bin lies within the i-th one.
+Each plane is the one before with a few shifted copies of the edges laid over it, for all bins at once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence_metric.edge_parameters import LARGEST_TRUNCATION_PX, MOST_BINS
+from vergence_metric.edges import Edges
+from vergence_metric.windows import Window
+
+
+@dataclass(frozen=True)
+class OrientedEdges:
+    """Edge pixels of one image inside the largest window, and who is near them.
+
+    `row`, `column` (n,) count from the corner of the largest window, `bin` (n,) uint8 is the direction, `ring` (n,) the
+    index of the smallest window that holds the pixel, windows sorted by size. `planes` (radii, pixels) uint8 are the
+    planes the module describes, `at` (n,) the edge pixels' places in them.
+    """
+
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    bin: NDArray[np.uint8]
+    ring: NDArray[np.int64]
+    at: NDArray[np.int64]
+    planes: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class OrientedField:
+    """Oriented edges of the left and the right image in centre windows, which are sorted by size."""
+
+    windows: tuple[Window, ...]
+    bins: int
+    truncation_px: int
+    images: tuple[OrientedEdges, OrientedEdges]
+
+    def distances_px(self, direction: int, truncation_px: int) -> NDArray[np.float32]:
+        """Return the truncated distance of each edge pixel of image `direction` to the other's of its bin, (n,)."""
+        edges, planes = self.images[direction], self.images[1 - direction].planes
+        steps = radius_steps(truncation_px)
+        near = np.take(planes[: len(steps)], edges.at, axis=1)
+        near >>= edges.bin
+        near &= 1
+        return np.float32(truncation_px) - steps @ near.astype(np.float32)
+
+    def mean_distances_px(self, image: int, truncation_px: int, points_per_side: int) -> NDArray[np.float64]:
+        """Return the mean truncated distance to the edges of `image`, (windows, bins), over a lattice of pixels."""
+        inner, planes = self.windows[-1], self.images[image].planes
+        steps = radius_steps(truncation_px).astype(np.float64)
+        stride = inner.width + 2 * self.truncation_px
+        means = np.empty((len(self.windows), self.bins))
+        for i, window in enumerate(self.windows):
+            row, column = window.lattice(points_per_side)
+            row += window.top - inner.top + self.truncation_px
+            column += window.left - inner.left + self.truncation_px
+            near = np.take(planes[: len(steps)], row[:, None] * stride + column, axis=1)
+            # a bit becomes a byte of its own, so that one addition of words adds up all bins of a row's pixels
+            counts = _SPREAD[near].sum(axis=1).view(np.uint8).reshape(len(steps), -1, MOST_BINS).sum(axis=1)
+            means[i] = truncation_px - steps @ counts[:, : self.bins] / (len(row) * len(column))
+        return means
+
+
+_SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").view(np.uint64).ravel()
+
+
+def oriented_field(
+    left: Edges, right: Edges, windows: Sequence[Window], *, bins: int, signed: bool, truncation_px: int
+) -> OrientedField:
+    """Return the oriented edges of a pair, with distances up to `truncation_px`.
+
+    `bins` directions over 360 degrees where `signed` tells dark-to-bright from bright-to-dark, else over 180; the first
+    is centred on horizontal gradients. Neighbours may lie outside a window: unlike the paper's metric this one only
+    looks `truncation_px` far, and edges cut off by a window's border would be nothing but noise.
+    """
+    if not 1 <= truncation_px <= LARGEST_TRUNCATION_PX or not 1 <= bins <= MOST_BINS:
+        raise ValueError(
+            f"truncation of {truncation_px} px, {bins} bins: they must be from 1 to {LARGEST_TRUNCATION_PX} px and "
+            f"from 1 to {MOST_BINS}"
+        )
+    ordered = tuple(sorted(windows, key=lambda window: window.size_px))
+    images = [_oriented(edges, ordered, bins, signed, truncation_px) for edges in (left, right)]
+    return OrientedField(ordered, bins, truncation_px, (images[0], images[1]))
+
+
+@cache
+def radius_steps(truncation_px: int) -> NDArray[np.float32]:
+    """Return what each plane's bit takes off the cut-off distance: from its radius to the next larger one [px]."""
+    radii = np.sqrt([*_offsets(truncation_px), truncation_px**2])
+    return np.diff(radii).astype(np.float32)
+
+
+@cache
+def _offsets(truncation_px: int) -> dict[int, tuple[tuple[int, int], ...]]:
+    """Return, by squared distance below the cut-off, the (dx, dy) >= 0 that have it, in rising order."""
+    reach = range(truncation_px)
+    pairs = [(dx, dy) for dx in reach for dy in reach if dx * dx + dy * dy < truncation_px**2]
+    squares = sorted({dx * dx + dy * dy for dx, dy in pairs})
+    return {s: tuple((dx, dy) for dx, dy in pairs if dx * dx + dy * dy == s) for s in squares}
+
+
+def _oriented(edges: Edges, windows: tuple[Window, ...], bins: int, signed: bool, truncation: int) -> OrientedEdges:
+    inner = windows[-1]
+    rows, columns = (
+        slice(inner.top - truncation, inner.bottom + truncation),
+        slice(inner.left - truncation, inner.right + truncation),
+    )
+    mask = _margined(edges.mask, rows, columns)
+    stride = mask.shape[1]
+    at = np.flatnonzero(mask != 0)
+    row, column = np.divmod(at, stride)
+    image_at = (row + rows.start, column + columns.start)
+    direction = np.arctan2(edges.gradient_y[image_at], edges.gradient_x[image_at], dtype=np.float32)
+    per_turn = bins if signed else 2 * bins
+    bin_ = (np.rint(direction * np.float32(per_turn / (2 * np.pi))).astype(np.int8) % bins).astype(np.uint8)
+    base = np.zeros(mask.size, np.uint8)
+    base[at] = np.left_shift(np.uint8(1), bin_)
+    row -= truncation
+    column -= truncation
+    ring = np.maximum(
+        _rings([(w.top - inner.top, w.bottom - inner.top) for w in windows], inner.height, truncation)[row],
+        _rings([(w.left - inner.left, w.right - inner.left) for w in windows], inner.width, truncation)[column],
+    )
+    inside = np.flatnonzero(ring < len(windows))
+    return OrientedEdges(
+        row[inside], column[inside], bin_[inside], ring[inside], at[inside], _planes(base, stride, truncation)
+    )
+
+
+def _margined(mask: NDArray[np.uint8], rows: slice, columns: slice) -> NDArray[np.uint8]:
+    """Return mask[rows, columns], with zeros where that leaves the mask."""
+    height, width = mask.shape
+    inside = mask[max(rows.start, 0) : rows.stop, max(columns.start, 0) : columns.stop]
+    lacking = (max(-rows.start, 0), max(rows.stop - height, 0)), (max(-columns.start, 0), max(columns.stop - width, 0))
+    return np.pad(inside, lacking) if any(map(any, lacking)) else inside
+
+
+def _rings(spans: list[tuple[int, int]], length: int, margin: int) -> NDArray[np.int64]:
+    """Return, for each position from 0 to length + margin and then from -margin, the first span that holds it."""
+    ring = np.full(length + 2 * margin, len(spans), np.int64)
+    for i, (start, stop) in reversed(list(enumerate(spans))):
+        ring[start:stop] = i
+    return ring
+
+
+def _planes(base: NDArray[np.uint8], stride: int, truncation: int) -> NDArray[np.uint8]:
+    """Return the planes of all radii below the cut-off; rows are laid end to end, the outer margin is not valid."""
+    planes = np.zeros((len(_offsets(truncation)), base.size), np.uint8)
+    margin = (truncation - 1) * stride + truncation
+    inner = slice(margin, base.size - margin)
+    aside = [base]  # base shifted by dx to both sides
+    for dx in range(1, truncation):
+        both = np.zeros_like(base)
+        np.bitwise_or(base[2 * dx :], base[: -2 * dx], out=both[dx:-dx])
+        aside.append(both)
+    planes[0] = base
+    for i, offsets in enumerate(_offsets(truncation).values()):
+        plane, before = planes[i, inner], planes[max(i - 1, 0), inner]
+        for dx, dy in offsets:
+            for shift in {dy * stride, -dy * stride}:
+                np.bitwise_or(before, aside[dx][margin + shift : base.size - margin + shift], out=plane)
+                before = plane
+    return planes
