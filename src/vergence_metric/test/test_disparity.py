@@ -72,7 +72,7 @@ def test_a_point_off_the_centre_and_an_expectation():
         assert answer.horizontal_px == pytest.approx(22.0, abs=0.05)
 
 
-@pytest.mark.parametrize("half_width_px", [15, 40])
+@pytest.mark.parametrize("half_width_px", [9, 15, 40])
 def test_the_surface_at_the_point_counts_and_not_the_one_behind(half_width_px):
     near, far = texture(6), texture(7)
     left, right = view(far, 0.0), view(far, 4.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from vergence_rig.parameters import ParameterError, Parameters, parameter
 
-ESTIMATORS = ("affine", "zncc")
+ESTIMATORS = ("affine", "zncc", "edge_shift", "phase", "cepstral", "gabor")
 DEPTH_POLICIES = ("center", "nearest", "largest", "box")
 
 

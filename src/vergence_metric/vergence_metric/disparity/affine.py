@@ -14,16 +14,17 @@ from numpy.typing import NDArray
 
 from vergence_metric.disparity.correlation import radius_of
 from vergence_metric.disparity.fovea_pair import FoveaPair, Strip
-from vergence_metric.disparity.protocol import Disparity, Image, checked_point
-from vergence_metric.disparity.search import Match, find, pair_about
-from vergence_metric.disparity.zncc import answer
+from vergence_metric.disparity.measured import Measured
+from vergence_metric.disparity.search import Match
 from vergence_metric.fovea_parameters import DisparityParameters
 
-_BLUR_PX = 0.9  # bicubic interpolation is all but exact on what this leaves
+_BLUR_PX = 0.9  # linear interpolation is all but exact on what this leaves
+_REMAP_STEPS = 32  # per pixel
 _ITERATIONS = 12
 _CONVERGED_PX = 0.003
 _LARGEST_STEP_PX = 3.0
 _LARGEST_SHEAR = 0.4
+_SHEAR_FROM_PX = 8.0
 _PRIOR_SHEAR = 0.1  # standard deviation of slant and roll between the eyes
 _PRIOR_VERTICAL_PX = 1.0
 
@@ -43,46 +44,10 @@ class Fit:
     affine: Matrix
 
 
-class AffineEstimator:
-    """The search of `search.find`, refined by Lucas-Kanade with an affine warp, gain and offset."""
-
-    name = "affine"
-
-    def __init__(self, parameters: DisparityParameters) -> None:
-        self._parameters = parameters
-
-    def estimate(
-        self,
-        left: Image,
-        right: Image,
-        point_px: tuple[float, float] | None = None,
-        expected_px: float | None = None,
-    ) -> Disparity:
-        """Return the disparity at a point; see DisparityEstimator."""
-        point = checked_point(left, right, point_px)
-        pair = pair_about(left, right, point, self._parameters)
-        match = find(pair, self._parameters, expected_px)
-        found = answer(match, self.name, point)
-        return refined(found, pair, match, self._parameters)
-
-
-def refined(found: Disparity, pair: FoveaPair, match: Match, parameters: DisparityParameters) -> Disparity:
-    """Return the answer with its figures refined, unrefined where there is none or the refinement runs away."""
-    if math.isnan(found.horizontal_px):
-        return found
-    fit = grow(pair, found.horizontal_px, found.vertical_px, match.window_px, parameters)
-    if fit is None:
-        return found
-    return Disparity(
-        fit.horizontal_px,
-        fit.vertical_px,
-        fit.sigma_px,
-        found.confidence,
-        found.status,
-        found.reason,
-        found.estimator,
-        found.point_px,
-    )
+def measure_affine(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> Measured | None:
+    """Return the disparity by the affine fit about a match; None where it does not converge."""
+    fit = grow(pair, match.horizontal_px, match.vertical_px, match.window_px, parameters)
+    return None if fit is None else Measured(fit.horizontal_px, fit.vertical_px, fit.sigma_px)
 
 
 def grow(
@@ -142,7 +107,8 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
         return None
     damping = np.zeros(8)
     noise = 1.0 / (2 * math.pi * sigma**2)
-    damping[[1, 2, 4, 5]] = noise / (_PRIOR_SHEAR * sigma) ** 2
+    # A small window barely sees roll and slant, and fitting them costs it its precision: there they stay as they are.
+    damping[[1, 2, 4, 5]] = noise / (_PRIOR_SHEAR * sigma) ** 2 if sigma >= _SHEAR_FROM_PX else 1e9
     damping[3] = noise / _PRIOR_VERTICAL_PX**2
     try:
         inverse = np.linalg.inv(normal + np.diag(damping * 4.0))
@@ -152,10 +118,15 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
     offsets = np.stack([us.ravel(), vs.ravel(), np.ones(patch.size)])
     origin = np.array([point_px[0] - right.x0, point_px[1] - right.y0])
     homogeneous = np.vstack([warp, [0.0, 0.0, 1.0]])
+    gain = 1.0
     for _ in range(_ITERATIONS):
-        places = (homogeneous[:2] @ offsets + origin[:, None]).astype(np.float32).reshape(2, *patch.shape)
-        seen = cv2.remap(right.grey, places[0], places[1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        seen = seen.ravel().astype(np.float64)
+        places = homogeneous[:2] @ offsets + origin[:, None]
+        # remap of OpenCV 4 rounds to this grid, that of OpenCV 5 does not: round first, make good what that misses.
+        rounded = np.rint(places * _REMAP_STEPS) / _REMAP_STEPS
+        maps = rounded.astype(np.float32).reshape(2, *patch.shape)
+        seen = cv2.remap(right.grey, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        missed = gain * ((places[0] - rounded[0]) * design[0] + (places[1] - rounded[1]) * design[3])
+        seen = seen.ravel() + missed
         solution = inverse @ (weighted @ seen)
         gain = float(solution[6])
         if gain < 0.2 or gain > 5.0:

@@ -82,12 +82,13 @@ class Surface:
         """Return (horizontal, vertical) disparity of the peak at column i, row j by a parabola in each direction."""
         z = self.zncc
         rows, columns = z.shape
-        di = _parabola(z[j, i - 1], z[j, i], z[j, i + 1]) if 0 < i < columns - 1 else 0.0
-        dj = _parabola(z[j - 1, i], z[j, i], z[j + 1, i]) if 0 < j < rows - 1 else 0.0
+        di = parabola(z[j, i - 1], z[j, i], z[j, i + 1]) if 0 < i < columns - 1 else 0.0
+        dj = parabola(z[j - 1, i], z[j, i], z[j + 1, i]) if 0 < j < rows - 1 else 0.0
         return self.first_d + i + di, self.first_v + j + dj
 
 
-def _parabola(before: float, at: float, after: float) -> float:
+def parabola(before: float, at: float, after: float) -> float:
+    """Return the offset in -0.5..0.5 of the maximum from the middle one of three values a pixel apart."""
     bend = float(before) - 2.0 * float(at) + float(after)
     return 0.0 if bend >= -1e-9 else float(np.clip(0.5 * (float(before) - float(after)) / bend, -0.5, 0.5))
 

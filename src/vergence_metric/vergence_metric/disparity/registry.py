@@ -1,23 +1,31 @@
 """Estimators by name."""
 
-from collections.abc import Callable
-
-from vergence_metric.disparity.affine import AffineEstimator
+from vergence_metric.disparity.affine import measure_affine
+from vergence_metric.disparity.cepstral import measure_cepstral
+from vergence_metric.disparity.edge_shift import measure_edge_shift
+from vergence_metric.disparity.gabor import measure_gabor
+from vergence_metric.disparity.measured import Measure, MeasuredEstimator
+from vergence_metric.disparity.phase import measure_phase
 from vergence_metric.disparity.protocol import DisparityEstimator
-from vergence_metric.disparity.zncc import ZnccEstimator
+from vergence_metric.disparity.zncc import measure_zncc
 from vergence_metric.fovea_parameters import DisparityParameters
 
-_ESTIMATORS: dict[str, Callable[[DisparityParameters], DisparityEstimator]] = {
-    "affine": AffineEstimator,
-    "zncc": ZnccEstimator,
+_MEASURES: dict[str, Measure] = {
+    "affine": measure_affine,
+    "zncc": measure_zncc,
+    "edge_shift": measure_edge_shift,
+    "phase": measure_phase,
+    "cepstral": measure_cepstral,
+    "gabor": measure_gabor,
 }
-
-
-def make_estimator(parameters: DisparityParameters) -> DisparityEstimator:
-    """Return the estimator that `parameters.disparity_estimator` names."""
-    return _ESTIMATORS[parameters.disparity_estimator](parameters)
 
 
 def names() -> tuple[str, ...]:
     """Return the names of all estimators."""
-    return tuple(_ESTIMATORS)
+    return tuple(_MEASURES)
+
+
+def make_estimator(parameters: DisparityParameters) -> DisparityEstimator:
+    """Return the estimator that `parameters.disparity_estimator` names."""
+    name = parameters.disparity_estimator
+    return MeasuredEstimator(name, _MEASURES[name], parameters)

@@ -1,40 +1,24 @@
 """Disparity by normalised cross-correlation of the fovea, with a sub-pixel peak."""
 
-from vergence_metric.disparity.protocol import Disparity, Image, checked_point
-from vergence_metric.disparity.search import Match, find, pair_about
+from vergence_metric.disparity.correlation import correlate
+from vergence_metric.disparity.fovea_pair import FoveaPair
+from vergence_metric.disparity.measured import Measured, measuring_window_px
+from vergence_metric.disparity.search import Match, deviation_px
 from vergence_metric.fovea_parameters import DisparityParameters
 
-
-class ZnccEstimator:
-    """Zero-mean normalised cross-correlation in Gaussian windows, see `search.find`; a parabola finds the peak."""
-
-    name = "zncc"
-
-    def __init__(self, parameters: DisparityParameters) -> None:
-        self._parameters = parameters
-
-    def estimate(
-        self,
-        left: Image,
-        right: Image,
-        point_px: tuple[float, float] | None = None,
-        expected_px: float | None = None,
-    ) -> Disparity:
-        """Return the disparity at a point; see DisparityEstimator."""
-        point = checked_point(left, right, point_px)
-        match = find(pair_about(left, right, point, self._parameters), self._parameters, expected_px)
-        return answer(match, self.name, point)
+_REACH_PX = 3
 
 
-def answer(match: Match, estimator: str, point_px: tuple[float, float]) -> Disparity:
-    """Return a match as an answer."""
-    return Disparity(
-        match.horizontal_px,
-        match.vertical_px,
-        match.sigma_px,
-        match.evidence.confidence,
-        match.status,
-        match.reason,
-        estimator,
-        point_px,
-    )
+def measure_zncc(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> Measured | None:
+    """Return the parabola's peak of the correlation at full resolution, None if it lies at the rim."""
+    left, right = pair.full
+    at = (round(pair.point_px[0]), round(pair.point_px[1]))
+    d, v = round(match.horizontal_px), round(match.vertical_px)
+    window_px = measuring_window_px(match, parameters)
+    surface = correlate(left, right, at, window_px, (d - _REACH_PX, d + _REACH_PX), (v - _REACH_PX, v + _REACH_PX))
+    i, j, value = surface.peak_near(d, _REACH_PX)
+    rows, columns = surface.zncc.shape
+    if not (0 < i < columns - 1 and 0 < j < rows - 1):
+        return None
+    horizontal, vertical = surface.subpixel(i, j)
+    return Measured(horizontal, vertical, deviation_px(surface, value))
