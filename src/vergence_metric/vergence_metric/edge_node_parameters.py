@@ -1,4 +1,4 @@
-"""Parameters of edge_metric_node: those of its input, its metric, its disparity estimator and its tracker in one set."""
+"""Parameters of edge_metric_node in one set: of its input, its metric, its disparity estimator and its tracker."""
 
 from dataclasses import dataclass
 

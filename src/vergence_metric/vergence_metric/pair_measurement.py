@@ -21,6 +21,7 @@ class PairMeasurement:
     """Metric I, the fovea's signed disparity and the followed target of pair after pair, in order of their stamps."""
 
     def __init__(self, parameters: EdgeMetricNodeParameters, rig: Rig) -> None:
+        self._baseline_m = rig.baseline_m
         self._rig_models = (CameraModel(rig.left_camera), CameraModel(rig.right_camera))
         self._tracker: TargetTracker | None = None
         self._models: Models | None = None
@@ -63,7 +64,7 @@ class PairMeasurement:
             return self._nothing("no joint_states at the image's stamp")
         if self._tracker is None or models != self._models:
             self._models, self._ids_used = models, self._newest_id
-            self._tracker = TargetTracker(self._parameters, self._estimator, *models)
+            self._tracker = TargetTracker(self._parameters, self._estimator, *models, self._baseline_m)
         track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes)
         self._newest_id = self._ids_used + track.track_id
         return replace(track, track_id=self._newest_id)
