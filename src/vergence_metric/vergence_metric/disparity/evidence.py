@@ -43,8 +43,10 @@ class Evidence:
     @property
     def confidence(self) -> float:
         """Share of answers with this evidence that lie within 2 px of the truth, from 0 to 1."""
+        if self.correlation <= 0.0:
+            return 0.0
         certain = 1.0 / (1.0 + math.exp(-2.0 * (self.significance - 1.5)))
-        unique = 1.0 if self.correlation <= 0 else min(max(2.0 * (1.0 - self.rival / self.correlation), 0.0), 1.0)
+        unique = min(max(2.0 * (1.0 - self.rival / self.correlation), 0.0), 1.0)
         returns = 1.0 if self.left_right_px <= 2.0 else 0.1
         return min(certain * unique * returns, self.ceiling)
 

@@ -2,6 +2,7 @@
 
 from vergence_metric.disparity.affine import measure_affine
 from vergence_metric.disparity.cepstral import measure_cepstral
+from vergence_metric.disparity.depth_policy import DepthPolicyEstimator
 from vergence_metric.disparity.edge_shift import measure_edge_shift
 from vergence_metric.disparity.gabor import measure_gabor
 from vergence_metric.disparity.measured import Measure, MeasuredEstimator
@@ -26,6 +27,9 @@ def names() -> tuple[str, ...]:
 
 
 def make_estimator(parameters: DisparityParameters) -> DisparityEstimator:
-    """Return the estimator that `parameters.disparity_estimator` names."""
+    """Return the estimator that `parameters.disparity_estimator` names, behind the depth policy."""
     name = parameters.disparity_estimator
-    return MeasuredEstimator(name, _MEASURES[name], parameters)
+    estimator = MeasuredEstimator(name, _MEASURES[name], parameters)
+    if parameters.disparity_depth_policy == "center":
+        return estimator
+    return DepthPolicyEstimator(estimator, parameters)
