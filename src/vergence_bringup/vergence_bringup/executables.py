@@ -1,0 +1,35 @@
+"""Every node executable and the parameter classes it declares: what the shipped YAML and the reference are held to."""
+
+import importlib
+from dataclasses import dataclass
+
+from vergence_rig.parameters import Parameters
+
+
+@dataclass(frozen=True)
+class Executable:
+    """One node: its package, and each parameter group as (prefix, "module:Class")."""
+
+    package: str
+    groups: tuple[tuple[str, str], ...]
+
+
+EXECUTABLES: dict[str, Executable] = {
+    "camera_node": Executable("vergence_camera", (("", "vergence_camera.parameters:CameraParameters"),)),
+    "edge_metric_node": Executable(
+        "vergence_metric", (("", "vergence_metric.edge_node_parameters:EdgeMetricNodeParameters"),)
+    ),
+    "gaze_controller_node": Executable(
+        "vergence_servo", (("", "vergence_servo.gaze_controller_node:GazeNodeParameters"),)
+    ),
+    "sim_node": Executable("vergence_sim", (("", "vergence_sim.parameters:SimParameters"),)),
+}
+
+
+def parameter_groups(executable: str) -> list[tuple[str, type[Parameters]]]:
+    """Return (prefix, class) of every parameter group of an executable."""
+    groups = []
+    for prefix, place in EXECUTABLES[executable].groups:
+        module, name = place.split(":")
+        groups.append((prefix, getattr(importlib.import_module(module), name)))
+    return groups
