@@ -1,0 +1,49 @@
+"""The simulated head's joints: servo plants that turn MuJoCo's hinges."""
+
+from collections.abc import Mapping
+
+from vergence_rig.rig import JOINT_NAMES, Rig
+from vergence_rig.servo import PRESETS, ServoPlant
+from vergence_sim.parameters import SimParameters
+
+
+class CommandError(ValueError):
+    """A joint command that cannot be: nothing moves."""
+
+
+class Head:
+    """Three servo plants by joint name; a command is limited to the rig's joint limits."""
+
+    def __init__(self, rig: Rig, parameters: SimParameters) -> None:
+        self.rig = rig if parameters.servo == "rig" else rig.with_servos(PRESETS[parameters.servo])
+        self._plants = {name: ServoPlant(joint.servo, 0.0) for name, joint in self.rig.joints.items()}
+
+    def command(self, angles_rad: Mapping[str, float], now_s: float) -> None:
+        """Command joints by name [rad]; raises CommandError for an unknown name or an angle that is not finite."""
+        for name, angle in angles_rad.items():
+            if name not in self._plants:
+                raise CommandError(f"joint is {name!r}: allowed is one of {', '.join(JOINT_NAMES)}")
+            if not abs(angle) < 1e9:
+                raise CommandError(f"{name} is {angle!r}: allowed is a finite angle [rad]")
+        for name, angle in angles_rad.items():
+            self._plants[name].command(self.rig.joints[name].clamp(angle), now_s)
+
+    def step(self, now_s: float) -> None:
+        """Move on to `now_s`."""
+        for plant in self._plants.values():
+            plant.step(now_s)
+
+    def place(self, angles_rad: Mapping[str, float], now_s: float) -> None:
+        """Put the joints somewhere at once, past the servos."""
+        for name, angle in angles_rad.items():
+            self._plants[name] = ServoPlant(self.rig.joints[name].servo, angle, now_s)
+
+    @property
+    def true_rad(self) -> dict[str, float]:
+        """Where the shafts are."""
+        return {name: plant.true_rad for name, plant in self._plants.items()}
+
+    @property
+    def modelled_rad(self) -> dict[str, float]:
+        """Where a driver without feedback believes them."""
+        return {name: plant.modelled_rad for name, plant in self._plants.items()}

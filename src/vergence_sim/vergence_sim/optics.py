@@ -1,0 +1,103 @@
+"""What a cheap webcam does to a rendered view: lens distortion, exposure, white balance, noise, JPEG."""
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.rig import CameraSpec
+from vergence_sim.parameters import SimParameters
+
+Image = npt.NDArray[np.uint8]
+
+_NOISE_BANK = 8
+
+
+class Lens:
+    """Maps a rendered pinhole view, a little wider than the camera's, to the distorted image.
+
+    `render_focal_px` is the focal length to render with, so that no corner of the image is left without a view.
+    """
+
+    def __init__(self, camera: CameraSpec, distortion: tuple[float, ...]) -> None:
+        self.camera, self.distortion = camera, distortion
+        self._distortion = np.array(distortion)
+        self._matrix = np.array([[camera.fx_px, 0, camera.cx_px], [0, camera.fy_px, camera.cy_px], [0, 0, 1]])
+        self.render_focal_px = camera.fx_px
+        centre = np.array([(camera.width_px - 1) / 2, (camera.height_px - 1) / 2])
+        centred = bool((centre == (camera.cx_px, camera.cy_px)).all()) and camera.fx_px == camera.fy_px
+        self._maps: tuple[Any, Any] | None = None
+        if not any(distortion) and centred:
+            return
+        x, y = np.meshgrid(np.arange(camera.width_px, dtype=np.float64), np.arange(camera.height_px, dtype=np.float64))
+        pixels = np.stack([x.ravel(), y.ravel()], axis=1)[:, None, :]
+        rays = cv2.undistortPoints(pixels, self._matrix, self._distortion)
+        rays = rays.reshape(camera.height_px, camera.width_px, 2)
+        self.render_focal_px = float(min(camera.fx_px, *(centre / np.abs(rays).max(axis=(0, 1)))))
+        source = (rays * self.render_focal_px + centre).astype(np.float32)
+        fixed, fractions = cv2.convertMaps(source[:, :, 0], source[:, :, 1], cv2.CV_16SC2)
+        self._maps = fixed, fractions
+
+    def apply(self, view: Image) -> Image:
+        """Return the distorted image of a rendered view (h, w, 3)."""
+        if self._maps is None:
+            return view
+        return np.asarray(cv2.remap(view, self._maps[0], self._maps[1], cv2.INTER_LINEAR), np.uint8)
+
+    def distorted(self, pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return where the lens puts what an ideal one would put at `pixel` (x, y) [px]; NaN stays NaN."""
+        if math.isnan(pixel[0]) or not self._distortion.any():
+            return pixel
+        x, y = (pixel[0] - self.camera.cx_px) / self.camera.fx_px, (pixel[1] - self.camera.cy_px) / self.camera.fy_px
+        ray = np.array([[[x, y, 1.0]]])
+        placed, _ = cv2.projectPoints(ray, np.zeros(3), np.zeros(3), self._matrix, self._distortion)
+        return float(placed[0, 0, 0]), float(placed[0, 0, 1])
+
+
+class Sensor:
+    """Exposure, white balance, noise and JPEG of one eye. Deterministic for a generator of one seed."""
+
+    def __init__(self, rng: np.random.Generator, shape: tuple[int, int], right: bool) -> None:
+        self._rng = rng
+        self._right = right
+        height, width = shape
+        self._bank = rng.standard_normal((_NOISE_BANK, height, width, 3), dtype=np.float32)
+        self._noise: npt.NDArray[np.int16] | None = None
+        self._noise_sigma = -1.0
+        self._table: npt.NDArray[np.uint8] | None = None
+        self._gains = (-1.0, -1.0, -1.0)
+
+    def apply(self, image: Image, parameters: SimParameters) -> Image:
+        """Return what the sensor makes of an image (h, w, 3) BGR."""
+        if self._right:
+            image = self._exposed(image, parameters)
+        if parameters.noise_sigma > 0:
+            image = self._noisy(image, parameters.noise_sigma)
+        if parameters.jpeg_quality > 0:
+            _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, parameters.jpeg_quality])
+            image = np.asarray(cv2.imdecode(jpeg, cv2.IMREAD_COLOR), np.uint8)
+        return image
+
+    def _exposed(self, image: Image, parameters: SimParameters) -> Image:
+        gain = parameters.right_gain
+        gains = (gain * parameters.right_blue_gain, gain, gain * parameters.right_red_gain)
+        if gains == (1.0, 1.0, 1.0):
+            return image
+        if gains != self._gains:
+            levels = np.arange(256)[:, None] * np.array(gains)
+            self._table = np.clip(np.rint(levels), 0, 255).astype(np.uint8).reshape(256, 1, 3)
+            self._gains = gains
+        return np.asarray(cv2.LUT(image, self._table), np.uint8)
+
+    def _noisy(self, image: Image, sigma: float) -> Image:
+        if sigma != self._noise_sigma:
+            self._noise = np.rint(self._bank * sigma).astype(np.int16)
+            self._noise_sigma = sigma
+        assert self._noise is not None
+        # A whole new field for every frame would cost more than the rendering: a drawn one, rolled by a drawn shift.
+        field = self._noise[self._rng.integers(_NOISE_BANK)]
+        rows = int(self._rng.integers(image.shape[0]))
+        noise = np.concatenate([field[rows:], field[:rows]])
+        return np.asarray(cv2.add(image, noise, dtype=cv2.CV_8U), np.uint8)

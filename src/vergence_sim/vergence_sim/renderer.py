@@ -1,0 +1,62 @@
+"""Offscreen rendering of both eyes with MuJoCo, on EGL or OSMesa."""
+
+import os
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+Image = npt.NDArray[np.uint8]
+
+
+class RenderError(RuntimeError):
+    """No way to render offscreen on this machine."""
+
+
+class EyeRenderer:
+    """Renders a named camera of a model as (h, w, 3) BGR uint8."""
+
+    def __init__(self, model: Any, width_px: int, height_px: int) -> None:
+        self._context: Any = None
+        try:
+            self._context = mujoco.GLContext(width_px, height_px)
+        except Exception as error:
+            raise RenderError(
+                f"MuJoCo cannot render with MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {error}; install libegl1 and "
+                "libgl1-mesa-dri, or libosmesa6 and set MUJOCO_GL=osmesa"
+            ) from error
+        self._context.make_current()
+        self._model = model
+        self._scene = mujoco.MjvScene(model, maxgeom=1000)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
+        self._options = mujoco.MjvOption()
+        self._perturb = mujoco.MjvPerturb()
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
+        self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZERONEAR
+        self._viewport = mujoco.MjrRect(0, 0, width_px, height_px)
+        self._rgb = np.empty((height_px, width_px, 3), np.uint8)
+
+    def render(self, data: Any, camera: str) -> Image:
+        """Return the view of a camera."""
+        self._context.make_current()
+        self._camera.fixedcamid = self._model.camera(camera).id
+        mujoco.mjv_updateScene(
+            self._model, data, self._options, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
+        )
+        mujoco.mjr_render(self._viewport, self._scene, self._mjr)
+        mujoco.mjr_readPixels(self._rgb, None, self._viewport, self._mjr)
+        # OpenGL's rows run upwards and its channels are RGB.
+        return np.ascontiguousarray(self._rgb[::-1, :, ::-1])
+
+    def close(self) -> None:
+        """Free what was allocated; twice is once."""
+        if self._context is not None:
+            self._context.make_current()
+            self._mjr.free()
+            self._context.free()
+            self._context = None

@@ -1,0 +1,191 @@
+"""The simulator in lockstep, without ROS: command joints, advance the world, take pictures, ask for the truth."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.rig import Rig, default_rig
+from vergence_sim.head import Head
+from vergence_sim.motion import offset_m
+from vergence_sim.optics import Lens, Sensor
+from vergence_sim.parameters import TARGETS, SimParameters
+from vergence_sim.renderer import EyeRenderer
+from vergence_sim.scene import build_scene
+from vergence_sim.truth import TrueBox, Truth, TruthTeller
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.uint8]
+
+
+class TargetError(ValueError):
+    """A target that is not in the world, or a place it cannot be put."""
+
+
+@dataclass(frozen=True)
+class StereoFrame:
+    """One pair: (h, w, 3) BGR images, their exposure times, and the truth at the left one."""
+
+    left: Image
+    right: Image
+    left_stamp_s: float
+    right_stamp_s: float
+    truth: Truth
+
+
+class Simulator:
+    """A head in a room. Deterministic: the same parameters and calls give the same pictures.
+
+    Time is `time_s`, from 0, and moves only by `advance` and `advance_to`. `render=False` needs no OpenGL and cannot
+    take pictures.
+    """
+
+    def __init__(self, parameters: SimParameters | None = None, rig: Rig | None = None, render: bool = True) -> None:
+        self.parameters = (parameters or SimParameters()).effective()
+        self.rig = rig or default_rig()
+        self.head = Head(self.rig, self.parameters)
+        self.time_s = 0.0
+        cameras = {"left": self.rig.left_camera, "right": self.rig.right_camera}
+        self.lenses = {eye: Lens(camera, self.parameters.distortion) for eye, camera in cameras.items()}
+        focal_px = min(lens.render_focal_px for lens in self.lenses.values())
+        if len({lens.render_focal_px for lens in self.lenses.values()}) > 1:
+            raise ValueError(
+                "the simulator renders both eyes with one focal length: left_camera and right_camera differ"
+            )
+        height, width = self.rig.left_camera.height_px, self.rig.left_camera.width_px
+        self._model = build_scene(self.rig, self.parameters, 2 * math.atan(0.5 * height / focal_px))
+        self._data = mujoco.MjData(self._model)
+        self._truth = TruthTeller(self._model, self._data, self.lenses)
+        self._renderer = EyeRenderer(self._model, width, height) if render else None
+        seeds = np.random.SeedSequence(self.parameters.seed).spawn(2)
+        self._sensors = (
+            {
+                eye: Sensor(np.random.default_rng(seed), (height, width), eye == "right")
+                for eye, seed in zip(("left", "right"), seeds, strict=True)
+            }
+            if render
+            else {}
+        )
+        self._yaw_rad = 0.0
+        start = self.parameters
+        self._places: dict[str, Array] = {
+            name: np.array([0.0, 0.3 * number, -5.0]) for number, name in enumerate(TARGETS)
+        }
+        self._places[start.target] = np.array([start.start_x_m, start.start_y_m, start.start_z_m])
+        self._motion_since_s = 0.0
+        self._update()
+
+    def set_parameters(self, parameters: SimParameters) -> None:
+        """Take changed parameters (those that are not fixed at the start); a changed motion begins now."""
+        parameters = parameters.effective()
+        names = ("target", "motion", "motion_x_m", "motion_y_m", "motion_z_m", "motion_frequency_hz")
+        if any(getattr(parameters, name) != getattr(self.parameters, name) for name in names):
+            self._motion_since_s = self.time_s
+        if parameters.target != self.parameters.target:
+            self._hide(self.parameters.target)
+        self.parameters = parameters
+        self._update()
+
+    def command(self, angles_rad: Mapping[str, float], now_s: float | None = None) -> None:
+        """Command joints by name [rad], at `now_s` or now."""
+        self.head.command(angles_rad, self.time_s if now_s is None else now_s)
+
+    def set_head(self, angles_rad: Mapping[str, float]) -> None:
+        """Put the joints somewhere at once, past the servos: for studies of images against angles."""
+        self.head.place(angles_rad, self.time_s)
+        self._update()
+
+    def advance(self, duration_s: float) -> None:
+        """Let time pass."""
+        self.advance_to(self.time_s + duration_s)
+
+    def advance_to(self, time_s: float) -> None:
+        """Let time pass until `time_s`; an earlier time changes nothing."""
+        if time_s <= self.time_s:
+            return
+        self._yaw_rad += self.parameters.rig_yaw_rate_rad_s * (time_s - self.time_s)
+        self.time_s = time_s
+        self.head.step(time_s)
+        self._update()
+
+    def place_target(self, name: str, point_m: Sequence[float] | Array) -> None:
+        """Put a target's centre somewhere in rig_base (3,) [m] and make it the target; its motion begins anew."""
+        place = np.asarray(point_m, np.float64)
+        if name not in TARGETS:
+            raise TargetError(f"target is {name!r}: allowed is one of {', '.join(TARGETS)}")
+        if place.shape != (3,) or not np.isfinite(place).all():
+            raise TargetError(f"place is {point_m!r}: allowed are three finite numbers [m]")
+        if name != self.parameters.target:
+            self._hide(self.parameters.target)
+            self.parameters = self.parameters.replaced(target=name)
+        self._places[name] = place
+        self._motion_since_s = self.time_s
+        self._update()
+
+    def place_occluder(self, point_m: Sequence[float] | Array) -> None:
+        """Put the occluder, an upright board 18 by 24 cm, somewhere in rig_base (3,) [m]."""
+        self._data.mocap_pos[self._mocap("occluder")] = self._in_world(np.asarray(point_m, np.float64))
+        mujoco.mj_kinematics(self._model, self._data)
+
+    def view(self, eye: str) -> Image:
+        """Return what one eye, "left" or "right", sees now: (h, w, 3) BGR uint8."""
+        if self._renderer is None:
+            raise ValueError("this simulator was made with render=False: it takes no pictures")
+        return self._sensors[eye].apply(self.lenses[eye].apply(self._renderer.render(self._data, eye)), self.parameters)
+
+    def capture(self, skew_s: float = 0.0) -> StereoFrame:
+        """Return a pair exposed now; with a skew the right eye's exposure is that much later, and time has passed."""
+        truth, left_stamp_s, left = self.truth(), self.time_s, self.view("left")
+        self.advance(skew_s)
+        return StereoFrame(left, self.view("right"), left_stamp_s, self.time_s, truth)
+
+    def truth(self) -> Truth:
+        """Return the truth about the target now."""
+        return self._truth.look(self.parameters.target, self.head.true_rad)
+
+    def true_boxes(self, eye: str) -> list[TrueBox]:
+        """Return the true boxes of all targets in one eye's image."""
+        boxes = (self._truth.box(eye, name) for name in TARGETS)
+        return [box for box in boxes if box is not None]
+
+    def joint_states(self) -> dict[str, float]:
+        """Return the joint angles as a driver of servos without feedback publishes them [rad]."""
+        return self.head.modelled_rad
+
+    def true_joints(self) -> dict[str, float]:
+        """Return where the shafts really are [rad]."""
+        return self.head.true_rad
+
+    def close(self) -> None:
+        """Free the renderer; twice is once."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _hide(self, name: str) -> None:
+        self._places[name] = np.array([0.0, 0.3 * TARGETS.index(name), -5.0])  # below the floor
+
+    def _update(self) -> None:
+        data, joints = self._data, self.head.true_rad
+        for name in ("pan_left", "pan_right", "tilt"):
+            data.joint(name).qpos[0] = joints[name]
+        data.joint("yaw").qpos[0] = self._yaw_rad
+        for name, place in self._places.items():
+            moved = (
+                place + offset_m(self.parameters, self.time_s - self._motion_since_s)
+                if name == self.parameters.target
+                else place
+            )
+            data.mocap_pos[self._mocap(name)] = self._in_world(moved)
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_camlight(self._model, data)
+
+    def _mocap(self, body: str) -> int:
+        return int(self._model.body_mocapid[self._model.body(body).id])
+
+    def _in_world(self, point_m: Array) -> Array:
+        # Places are given in the rig's frame as it stood at the start: a turning rig leaves its targets behind.
+        return point_m + self._model.body("rig_base").pos
