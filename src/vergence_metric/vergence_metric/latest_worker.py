@@ -42,6 +42,11 @@ class LatestWorker(Generic[Item]):
         """Items that a newer one replaced before they were taken up."""
         return max(self._submitted - self._taken - len(self._newest), 0)
 
+    @property
+    def alive(self) -> bool:
+        """True until the thread has ended."""
+        return self._thread.is_alive()
+
     def close(self, timeout_s: float = 5.0) -> None:
         """Finish the item at hand and end the thread; idempotent."""
         self._newest.clear()

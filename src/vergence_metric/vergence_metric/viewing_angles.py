@@ -27,7 +27,7 @@ def angular_disparity(
 
     NaN in, NaN out; NaN too where a lens model does not reach.
     """
-    if not (math.isfinite(horizontal_px) and math.isfinite(vertical_px)):
+    if not all(map(math.isfinite, (*point_px, horizontal_px, vertical_px))):
         return AngularDisparity(math.nan, math.nan, math.nan, math.nan)
     x_px, y_px = point_px
     (x_left, y_left), (x_right, y_right) = (
