@@ -47,10 +47,11 @@ class MultipartParser:
         while True:
             if self._body_begin is None and not self._find_body(now_ns):
                 break
+            time_ns = self._part_time_ns
             body = self._take_body()
             if body is None:
                 break
-            parts.append(Part(body, self._part_time_ns))
+            parts.append(Part(body, time_ns))
         if len(self._pending) > _LONGEST_PART:
             self._pending.clear()
             self._body_begin = None

@@ -1,0 +1,307 @@
+"""Recordings come at their rate, loop or end, and say when they are broken."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from vergence_camera.errors import (
+    CorruptFrameError,
+    FileMissingError,
+    ModeMismatchError,
+    ReplayEndedError,
+    TruncatedFileError,
+    UnsupportedError,
+)
+from vergence_camera.frame import Clock, Encoding, Frame, ModeRequest
+from vergence_camera.sources.recordings import AviRecording, FolderRecording, VideoRecording, open_recording
+from vergence_camera.sources.replay import Replay
+
+
+class FakeTime:
+    """A clock that only sleeping moves."""
+
+    def __init__(self) -> None:
+        self.ns = 1_000_000_000
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def sleep(self, seconds: float) -> None:
+        self.ns += round(seconds * 1e9)
+
+
+def replay(path: Path, request: ModeRequest | None = None, clock: FakeTime | None = None, **options: object) -> Replay:
+    clock = clock or FakeTime()
+    return Replay(
+        open_recording(path),
+        request or ModeRequest(),
+        sleep=clock.sleep,
+        now_ns=clock.now_ns,
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def frames_of(source: Replay, count: int) -> Iterator[Frame]:
+    while count:
+        frame = source.read(0.1)
+        if frame is not None:
+            count -= 1
+            yield frame
+
+
+def test_an_avi_passes_its_bytes_through_at_its_own_rate(mjpeg_avi: Path) -> None:
+    source = replay(mjpeg_avi)
+    assert str(source.open()) == "MJPG 320x240 at 25 Hz"
+    content = mjpeg_avi.read_bytes()
+    frames = list(frames_of(source, 10))
+    assert all(frame.encoding is Encoding.JPEG and frame.clock is Clock.MONOTONIC for frame in frames)
+    assert all(isinstance(frame.data, bytes) and frame.data in content for frame in frames)
+    assert {b.time_ns - a.time_ns for a, b in zip(frames, frames[1:], strict=False)} == {40_000_000}
+
+
+@pytest.mark.parametrize("rate_hz", [5.0, 100.0])
+def test_another_rate_may_be_asked_for(mjpeg_avi: Path, rate_hz: float) -> None:
+    source = replay(mjpeg_avi, rate_hz=rate_hz)
+    assert source.open().rate_hz == rate_hz
+    frames = list(frames_of(source, 5))
+    assert (frames[-1].time_ns - frames[0].time_ns) * 1e-9 == pytest.approx(4.0 / rate_hz)
+
+
+def test_loops_without_a_break_in_sequence_or_rate(mjpeg_avi: Path) -> None:
+    source = replay(mjpeg_avi)
+    source.open()
+    frames = list(frames_of(source, 25))
+    assert [frame.sequence for frame in frames] == list(range(25))
+    assert frames[0].data == frames[10].data == frames[20].data
+    assert {b.time_ns - a.time_ns for a, b in zip(frames, frames[1:], strict=False)} == {40_000_000}
+
+
+def test_ends_when_it_is_to_be_played_once(mjpeg_avi: Path) -> None:
+    source = replay(mjpeg_avi, loop=False)
+    source.open()
+    assert len(list(frames_of(source, 10))) == 10
+    for _ in range(2):
+        with pytest.raises(ReplayEndedError):
+            list(frames_of(source, 1))
+
+
+def test_a_long_hold_up_does_not_make_it_race(mjpeg_avi: Path) -> None:
+    clock = FakeTime()
+    source = replay(mjpeg_avi, clock=clock, catch_up_s=0.25)
+    source.open()
+    list(frames_of(source, 2))
+    clock.sleep(3.0)
+    late, following = frames_of(source, 2)
+    assert clock.now_ns() - following.time_ns < 1_000_000
+    assert following.time_ns - late.time_ns == 40_000_000
+
+
+def test_reopening_begins_anew(mjpeg_avi: Path) -> None:
+    source = replay(mjpeg_avi)
+    source.open()
+    first = list(frames_of(source, 4))[0]
+    source.open()
+    assert next(frames_of(source, 1)).data == first.data
+    source.close()
+    source.close()
+
+
+def test_size_mismatch_names_both(mjpeg_avi: Path) -> None:
+    with pytest.raises(ModeMismatchError, match=r"640x480.*320x240") as caught:
+        replay(mjpeg_avi, ModeRequest("MJPG", 640, 480)).open()
+    assert caught.value.permanent
+
+
+def test_a_truncated_avi_is_said_each_round(mjpeg_avi: Path) -> None:
+    content = mjpeg_avi.read_bytes()
+    mjpeg_avi.write_bytes(content[: len(content) * 2 // 3])
+    source = replay(mjpeg_avi)
+    source.open()
+    good = faults = 0
+    for _ in range(60):
+        try:
+            good += source.read(0.1) is not None
+        except TruncatedFileError:
+            faults += 1
+    assert faults >= 2
+    assert good > 8 * faults / 2
+
+
+def test_a_folder_in_natural_order_with_jpegs_untouched(tmp_path: Path, make_jpeg: Callable[..., bytes]) -> None:
+    for number in (1, 2, 10):
+        (tmp_path / f"img{number}.jpg").write_bytes(make_jpeg(number, 64, 48))
+    (tmp_path / "notes.txt").write_text("no picture")
+    source = replay(tmp_path)
+    mode = source.open()
+    assert (mode.pixel_format, mode.rate_hz) == ("MJPG", 30.0)
+    assert [frame.data for frame in frames_of(source, 3)] == [make_jpeg(n, 64, 48) for n in (1, 2, 10)]
+
+
+def test_a_folder_of_png_is_decoded_colour_and_grey(tmp_path: Path, make_pixels: Callable[..., np.ndarray]) -> None:
+    colour = make_pixels(0, 64, 48)
+    cv2.imwrite(str(tmp_path / "a.png"), colour)
+    cv2.imwrite(str(tmp_path / "b.png"), colour[:, :, 1])
+    source = replay(tmp_path)
+    source.open()
+    first, second = frames_of(source, 2)
+    assert (first.encoding, second.encoding) == (Encoding.BGR, Encoding.GREY)
+    assert np.array_equal(np.asarray(first.data), colour)
+    assert np.array_equal(np.asarray(second.data), colour[:, :, 1])
+
+
+def test_a_picture_of_another_size_is_dropped(tmp_path: Path, make_jpeg: Callable[..., bytes]) -> None:
+    for name, size in (("a", (64, 48)), ("b", (32, 24)), ("c", (64, 48))):
+        (tmp_path / f"{name}.jpg").write_bytes(make_jpeg(0, *size))
+    source = replay(tmp_path)
+    source.open()
+    next(frames_of(source, 1))
+    with pytest.raises(CorruptFrameError, match=r"32x24.*64x48"):
+        list(frames_of(source, 1))
+    assert next(frames_of(source, 1)).sequence == 2
+
+
+@pytest.mark.parametrize(
+    ("make", "error"),
+    [
+        (lambda p: p / "missing.avi", FileMissingError),
+        (lambda p: p, FileMissingError),
+        (lambda p: (p / "a.mp4", (p / "a.mp4").write_bytes(b"no video"))[0], UnsupportedError),
+        (lambda p: (p / "a.png", (p / "a.png").write_bytes(b"x"))[0], UnsupportedError),
+    ],
+    ids=["missing", "empty folder", "no video", "one picture"],
+)
+def test_unusable_recordings(tmp_path: Path, make: Callable[[Path], Path], error: type[Exception]) -> None:
+    with pytest.raises(error):
+        replay(make(tmp_path)).open()
+
+
+class BitWriter:
+    """Writes the fields of H.264's syntax."""
+
+    def __init__(self) -> None:
+        self.bits: list[int] = []
+
+    def u(self, value: int, length: int) -> "BitWriter":
+        self.bits += [value >> shift & 1 for shift in reversed(range(length))]
+        return self
+
+    def ue(self, *values: int) -> "BitWriter":
+        for value in values:
+            self.u(value + 1, 2 * (value + 1).bit_length() - 1)
+        return self
+
+    def align(self) -> "BitWriter":
+        return self.u(0, -len(self.bits) % 8)
+
+    def raw(self, data: bytes) -> "BitWriter":
+        self.bits += np.unpackbits(np.frombuffer(data, np.uint8)).tolist()
+        return self
+
+    def nal(self, header: int) -> bytes:
+        self.u(1, 1).align()
+        body = np.packbits(np.array(self.bits, np.uint8)).tobytes()
+        escaped = bytearray()
+        zeros = 0
+        for byte in body:
+            if zeros >= 2 and byte <= 3:
+                escaped.append(3)
+                zeros = 0
+            escaped.append(byte)
+            zeros = zeros + 1 if byte == 0 else 0
+        return b"\0\0\0\1" + bytes([header]) + bytes(escaped)
+
+
+def h264(pictures: list[np.ndarray], rate_hz: int) -> bytes:
+    """An H.264 stream (ITU-T H.264, baseline) made of PCM macroblocks; each picture is followed by a skipped one."""
+    height, width = pictures[0].shape[:2]
+    across, down = width // 16, height // 16
+    sps = BitWriter().u(66, 8).u(0xC0, 8).u(30, 8).ue(0, 0, 2, 1).u(0, 1).ue(across - 1, down - 1).u(0b1100, 4)
+    sps.bits[-1] = 1  # usability information: timing only
+    sps.u(0, 4).u(1, 1).u(1, 32).u(2 * rate_hz, 32).u(1, 1).u(0, 4)
+    pps = BitWriter().ue(0, 0).u(0, 2).ue(0, 0, 0).u(0, 3).ue(0, 0, 0).u(0b100, 3)
+    stream = sps.nal(0x67) + pps.nal(0x68)
+    for number, picture in enumerate(pictures):
+        planes = cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420)
+        luma = planes[:height]
+        chroma = planes[height:].reshape(2, height // 2, width // 2)
+        intra = BitWriter().ue(0, 7, 0).u(0, 4).ue(number % 2).u(0, 2).ue(0, 1)
+        for row in range(down):
+            for column in range(across):
+                block = luma[16 * row : 16 * row + 16, 16 * column : 16 * column + 16].tobytes()
+                block += chroma[:, 8 * row : 8 * row + 8, 8 * column : 8 * column + 8].tobytes()
+                intra.ue(25).align().raw(block)
+        skipped = BitWriter().ue(0, 5, 0).u(1, 4).u(0, 3).ue(0, 1, across * down)
+        stream += intra.nal(0x65) + skipped.nal(0x41)
+    return stream
+
+
+@pytest.fixture
+def h264_file(tmp_path: Path, make_pixels: Callable[..., np.ndarray]) -> Path:
+    path = tmp_path / "clip.h264"
+    path.write_bytes(h264([make_pixels(number, 160, 96) for number in range(4)], 25))
+    return path
+
+
+def test_h264_is_decoded(h264_file: Path, make_pixels: Callable[..., np.ndarray]) -> None:
+    source = replay(h264_file, ModeRequest("MJPG", 160, 96), loop=False)
+    mode = source.open()
+    assert (mode.pixel_format, mode.width_px, mode.height_px, mode.rate_hz) == ("H264", 160, 96, 25.0)
+    frames = list(frames_of(source, 8))
+    assert all(frame.encoding is Encoding.BGR for frame in frames)
+    for number, (intra, skipped) in enumerate(zip(frames[::2], frames[1::2], strict=True)):
+        assert np.array_equal(np.asarray(intra.data), np.asarray(skipped.data))
+        difference = np.abs(np.asarray(intra.data).astype(int) - make_pixels(number, 160, 96))
+        assert difference.mean() < 4.0  # chroma at half the resolution, and YUV's rounding
+    with pytest.raises(ReplayEndedError):
+        list(frames_of(source, 1))
+
+
+def test_h264_loops(h264_file: Path) -> None:
+    source = replay(h264_file)
+    source.open()
+    frames = list(frames_of(source, 17))
+    assert np.array_equal(np.asarray(frames[0].data), np.asarray(frames[16].data))
+
+
+@pytest.mark.parametrize(("code", "suffix"), [("mp4v", ".mp4"), ("VP80", ".mkv"), ("XVID", ".avi")])
+def test_other_containers_are_decoded(
+    tmp_path: Path, make_pixels: Callable[..., np.ndarray], code: str, suffix: str
+) -> None:
+    path = tmp_path / f"clip{suffix}"
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*code), 20.0, (160, 96))
+    if not writer.isOpened():
+        pytest.skip(f"this OpenCV cannot write {code}")
+    for number in range(6):
+        writer.write(make_pixels(number, 160, 96))
+    writer.release()
+    assert isinstance(open_recording(path), VideoRecording)
+    source = replay(path)
+    assert source.open().rate_hz == pytest.approx(20.0)
+    assert [np.asarray(frame.data).shape for frame in frames_of(source, 6)] == [(96, 160, 3)] * 6
+
+
+def test_a_truncated_video_is_said(tmp_path: Path, make_pixels: Callable[..., np.ndarray]) -> None:
+    path = tmp_path / "clip.avi"
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"XVID"), 20.0, (160, 96))
+    for number in range(40):
+        writer.write(make_pixels(number, 160, 96))
+    writer.release()
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    source = replay(path, loop=False)
+    source.open()
+    with pytest.raises(TruncatedFileError, match="of 40 frames"):
+        list(frames_of(source, 40))
+
+
+def test_the_kind_of_recording_is_found_by_content(mjpeg_avi: Path, tmp_path: Path) -> None:
+    disguised = tmp_path / "clip.mp4"
+    shutil.copy(mjpeg_avi, disguised)
+    assert isinstance(open_recording(disguised), AviRecording)
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    assert isinstance(open_recording(folder), FolderRecording)
