@@ -230,6 +230,7 @@ def test_estimators_that_disagree_hold_the_eyes_still() -> None:
         original(arrival_s, observation)
 
     run.head._send = shifted  # type: ignore[method-assign]
+    run.until(1.12)  # what was seen before is still on its way
     run.click()
     run.until(3.5)
     assert run.outcomes[-1].result is Result.DISAGREEMENT

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.rig import JOINT_NAMES, Rig
-from vergence_rig.servo import ServoPlant
+from vergence_rig.servo import ServoPlant, ServoSpec
 from vergence_servo.gaze.observations import (
     BoxSighting,
     EdgeJudgement,
@@ -38,6 +38,9 @@ class Seeing:
     frame_ticks: int = 10
     skew_ticks: int = 2
     noise_px: float = 0.3
+    right_roll_rad: float = 0.0
+    right_vertical_px: float = 0.0
+    stamp_error_s: float = 0.0
     track: bool = True
     fovea: bool = True
     boxes: bool = False
@@ -52,7 +55,9 @@ class Seeing:
 class FakeHead:
     """Rig, true servos, target and eyes. `visible(t)` hides the target; `target(t)` gives it (3,) in rig_base [m].
 
-    `clutter(t)` is a point that lies at the fovea while the target is hidden (an occluder), or None.
+    `clutter(t)` is a point that lies at the fovea while the target is hidden (an occluder), or None. `servos` are the
+    servos as they really are, by joint, where they differ from what the rig's description says. Time begins at
+    `begin_s`.
     """
 
     rig: Rig
@@ -62,23 +67,24 @@ class FakeHead:
     start_rad: Mapping[str, float] = field(default_factory=dict)
     visible: Callable[[float], bool] = lambda time_s: True
     clutter: Callable[[float], Array] | None = None
+    servos: Mapping[str, ServoSpec] = field(default_factory=dict)
+    begin_s: float = 0.0
 
     def __post_init__(self) -> None:
         self._random = np.random.default_rng(self.seed)
         self._ticks = 0
         self._order = itertools.count()
         self._arrivals: list[tuple[float, int, Observation]] = []
-        self._plants = {}
+        self._plants: dict[str, ServoPlant] = {}
+        self._models: dict[str, ServoPlant] = {}
         for name, joint in self.rig.joints.items():
+            servo, start = self.servos.get(name, joint.servo), self.start_rad.get(name, 0.0)
             # At rest a shaft lies anywhere in its play.
-            half = 0.5 * (joint.servo.dead_band_rad + joint.servo.backlash_rad)
-            start = self.start_rad.get(name, 0.0)
-            plant = ServoPlant(joint.servo, start + self._random.uniform(-half, half))
-            plant.command(start, 0.0)
-            plant.step(1e-6)
-            self._plants[name] = plant
+            half = 0.5 * (servo.dead_band_rad + servo.backlash_rad)
+            self._plants[name] = ServoPlant(servo, start + self._random.uniform(-half, half), self.begin_s)
+            self._models[name] = ServoPlant(joint.servo, start, self.begin_s)
         self._reported_rad = {name: self.start_rad.get(name, 0.0) for name in JOINT_NAMES}
-        self._track_id, self._lock_s = 0, -1.0
+        self._track_id, self._lock_s = 0, math.inf
         self._pending_frame: tuple[float, Array, bool] | None = None
         self._left_pixel = np.full(2, math.nan)
         self._fast_s = -math.inf
@@ -87,7 +93,7 @@ class FakeHead:
     @property
     def time_s(self) -> float:
         """The present."""
-        return self._ticks * TICK_S
+        return self.begin_s + self._ticks * TICK_S
 
     @property
     def true_rad(self) -> Array:
@@ -98,6 +104,7 @@ class FakeHead:
         """Command the joints (3,)."""
         for name, angle in zip(JOINT_NAMES, joints_rad, strict=True):
             self._plants[name].command(float(angle), self.time_s)
+            self._models[name].command(float(angle), self.time_s)
 
     def true_errors_rad(self) -> Array:
         """Return (version, vergence, tilt) to the target minus the true ones (3,)."""
@@ -117,12 +124,12 @@ class FakeHead:
         """Move on by one tick and return the observations that arrived in it."""
         self._ticks += 1
         now_s = self.time_s
-        for plant in self._plants.values():
+        for plant in (*self._plants.values(), *self._models.values()):
             plant.step(now_s)
         self._note_saccades()
         if self._ticks % 3 == 0:
             for name in JOINT_NAMES:
-                self._reported_rad[name] = self._plants[name].modelled_rad
+                self._reported_rad[name] = self._models[name].modelled_rad
             self._send(now_s + 0.002, JointReport(now_s, dict(self._reported_rad)))
         phase = self._ticks % self.seeing.frame_ticks
         if phase == 0:
@@ -159,17 +166,18 @@ class FakeHead:
 
     def _see_pair(self, left_s: float, left_xy: Array, visible: bool, right_s: float) -> None:
         seeing, focal = self.seeing, self.rig.left_camera.fx_px
-        right_xy = self._project(left=False)
+        right_xy = self._misaligned(self._project(left=False))
         noise = self._random.normal(0.0, seeing.noise_px / focal, 4)
         in_left = visible and self._in_view(left_xy)
         in_right = visible and self._in_view(right_xy)
         left_xy, right_xy = left_xy + noise[:2], right_xy + noise[2:]
         arrival_s = right_s + seeing.latency_s
+        left_s, right_s = left_s + seeing.stamp_error_s, right_s + seeing.stamp_error_s
         disparity = math.atan(left_xy[0]) - math.atan(right_xy[0]) if in_left and in_right else math.nan
         sigma = 1.5 * seeing.noise_px / focal
         skew_s = right_s - left_s
         if seeing.track:
-            locked = self._lock_s > 0 and left_s > self._lock_s
+            locked = left_s > self._lock_s
             usable = in_left and locked
             self._send(
                 arrival_s,
@@ -211,7 +219,7 @@ class FakeHead:
                 angles[2 * i : 2 * i + 2] = np.arctan(blurred)
         usable = left_xy is not None or right_xy is not None
         self._send(
-            left_s + skew_s + seeing.box_latency_s,
+            left_s + skew_s - seeing.stamp_error_s + seeing.box_latency_s,
             BoxSighting(
                 stamp_s=left_s,
                 skew_s=skew_s,
@@ -226,6 +234,11 @@ class FakeHead:
                 usable=usable,
             ),
         )
+
+    def _misaligned(self, xy: Array) -> Array:
+        sine, cosine = math.sin(self.seeing.right_roll_rad), math.cos(self.seeing.right_roll_rad)
+        offset = self.seeing.right_vertical_px / self.rig.right_camera.fy_px
+        return np.array([cosine * xy[0] - sine * xy[1], sine * xy[0] + cosine * xy[1] - offset])
 
     def _in_view(self, xy: Array) -> bool:
         camera = self.rig.left_camera

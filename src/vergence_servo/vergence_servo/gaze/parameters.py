@@ -79,10 +79,10 @@ class GazeParameters(Parameters):
     contrast_enter: float = parameter(0.72, "contrast below which the eyes may be verged", minimum=0, maximum=2)
     contrast_leave: float = parameter(0.9, "contrast above which they no longer are", minimum=0, maximum=2)
     verged_enter_rad: float = parameter(
-        0.007, "vergence and direction error below which the eyes may be verged", unit="rad", minimum=1e-4, maximum=0.2
+        0.0085, "vergence and direction error below which the eyes may be verged", unit="rad", minimum=1e-4, maximum=0.2
     )
     verged_leave_rad: float = parameter(
-        0.014, "error above which they no longer are", unit="rad", minimum=1e-4, maximum=0.2
+        0.0155, "error above which they no longer are", unit="rad", minimum=1e-4, maximum=0.2
     )
     verged_pairs: int = parameter(2, "pairs in a row that must say verged", minimum=1, maximum=100)
     unverged_pairs: int = parameter(4, "pairs in a row that must say not verged any more", minimum=1, maximum=100)
@@ -91,7 +91,7 @@ class GazeParameters(Parameters):
         0.35, "time without a sighting until the target is lost", unit="s", minimum=0.05, maximum=60
     )
     search_after_s: float = parameter(1.0, "time lost until the eyes search", unit="s", minimum=0, maximum=600)
-    search_dwell_s: float = parameter(0.25, "rest at each place of the search", unit="s", minimum=0.02, maximum=10)
+    search_dwell_s: float = parameter(0.3, "rest at each place of the search", unit="s", minimum=0.02, maximum=10)
     no_images_s: float = parameter(
         2.0, "time without any image result until a goal fails", unit="s", minimum=0.1, maximum=600
     )

@@ -83,10 +83,10 @@ class PhaseMachine:
             self.enter(Phase.VERGE, "the eyes did not arrive in time", s.now_s)
 
     def _without_target(self, s: Situation) -> None:
-        if s.may_search:
-            self.enter(Phase.SEARCH, "no target", s.now_s)
-        else:
-            self.enter(Phase.LOST, "no target", s.now_s)
+        if self.phase not in (Phase.LOST, Phase.SEARCH):
+            self.enter(Phase.LOST, "no target yet", s.now_s)
+        elif self.phase is Phase.LOST and s.may_search and s.now_s - self.since_s > self._p.search_dwell_s:
+            self.enter(Phase.SEARCH, "no target in view", s.now_s)
 
     def _unseen(self, s: Situation) -> None:
         if self.phase is Phase.SEARCH:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-_TURN_SHARE = 0.3
+_TURN_SHARE = 0.17
 _MOVE_SHARE = 0.12
 
 

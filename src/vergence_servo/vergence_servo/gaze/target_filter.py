@@ -28,6 +28,7 @@ _JUMP_SIGMA_RAD = 0.3
 _RATE_SIGMA_RAD_S = 0.5
 _LONGEST_PREDICTION_S = 2.0
 _LARGEST_VARIANCE = 1.0
+_LATEST_S = 0.3
 
 
 @dataclass(frozen=True)
@@ -186,8 +187,12 @@ class TargetFilter:
             model.covariance = model.covariance + extra
 
     def update(self, measurement: Measurement, may_jump: bool = True) -> bool:
-        """Take a measurement; False if it was late or gated out (for now: it may turn out to be a jump)."""
-        if not self.initialised or measurement.stamp_s < self._time_s - 1e-9:
+        """Take a measurement; False if it was too late or gated out (for now: it may turn out to be a jump).
+
+        A detector is slower than a tracker, so that stamps arrive out of order: the state is taken back to the stamp
+        along its rates, which is exact at rest and good for a moving target as long as the lateness is a few frames.
+        """
+        if not self.initialised or measurement.stamp_s < self._time_s - _LATEST_S:
             return False
         self._advance(measurement.stamp_s)
         terms = [model.innovation(measurement, self._time_s) for model in self._models]

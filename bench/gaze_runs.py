@@ -1,0 +1,244 @@
+"""One controller on one head in lockstep, and what came of it as arrays."""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.rig import Rig, default_rig
+from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
+from vergence_servo.gaze.controller import GazeController
+from vergence_servo.gaze.fake_head import TICK_S, FakeHead, Seeing
+from vergence_servo.gaze.goals import Goal, GoalKind
+from vergence_servo.gaze.observations import BoxSighting, Observation
+from vergence_servo.gaze.parameters import GazeParameters
+from vergence_servo.gaze.phases import Phase
+
+Array = npt.NDArray[np.float64]
+
+SERVOS: Mapping[str, ServoSpec] = {"ideal": IDEAL, "sg90": SG90, "mg995": MG995}
+CONTROL_TICKS = 3
+DECLARED_TOLERANCE_DEG = 1.0
+
+
+def tolerance_deg(servo: str) -> float:
+    """The true error within which the eyes are verged: 0.25 degree for ideal servos, the dead band for others."""
+    return 0.25 if servo == "ideal" else math.degrees(SERVOS[servo].dead_band_rad)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A target (seconds to (3,) [m]), where the eyes begin, how long, and how the target is given."""
+
+    target: Callable[[float], Array]
+    start_rad: Mapping[str, float]
+    duration_s: float
+    given: str = "pairs"
+    seed: int = 0
+    visible: Callable[[float], bool] = lambda time_s: True
+    clutter: Callable[[float], Array] | None = None
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Servos, latency and law of a run."""
+
+    law: str = "predictive"
+    servo: str = "sg90"
+    latency_ms: int = 60
+
+    @property
+    def suffix(self) -> str:
+        """What the row's name gets: nothing for the default."""
+        return "" if self == Setting() else f".{self.law}.{self.servo}.{self.latency_ms}"
+
+
+@dataclass
+class Trace:
+    """A run, sampled at the control rate: errors and joints (n, 3) in degrees; version, vergence, tilt and the pans."""
+
+    time_s: Array
+    errors_deg: Array
+    joints_deg: Array
+    commands_deg: Array
+    verged: npt.NDArray[np.bool_]
+    phase: npt.NDArray[np.int_]
+    distance_m: Array
+    step_s: Array
+    first_result_s: float
+    travel_s: float = 0.0
+
+    @property
+    def error_deg(self) -> Array:
+        """The largest of the three true errors (n,)."""
+        return np.abs(self.errors_deg).max(axis=1)
+
+    def stays_within_from(self, tolerance: float, after_s: float = 0.0) -> float:
+        """Time from which the true error stays within the tolerance to the end; infinite if it never does."""
+        late = self.time_s >= after_s
+        outside = np.flatnonzero(self.error_deg[late] > tolerance)
+        times = self.time_s[late]
+        if outside.size == 0:
+            return float(times[0])
+        return math.inf if outside[-1] + 1 >= times.size else float(times[outside[-1] + 1])
+
+    def declared_from(self, after_s: float) -> float:
+        """First time at or after `after_s` with `verged` in the state; infinite if never."""
+        said = np.flatnonzero(self.verged & (self.time_s >= after_s))
+        return float(self.time_s[said[0]]) if said.size else math.inf
+
+
+@dataclass
+class Realism:
+    """Seeded differences between the head as described and as it is; all zero is the ideal head."""
+
+    servo_spread: float = 0.2
+    noise_px: float = 0.4
+    roll_deg: float = 0.4
+    vertical_px: float = 4.0
+    stamp_error_s: float = 0.003
+    box: Mapping[str, float] = field(default_factory=lambda: {"rate_hz": 15.0, "latency_s": 0.04, "noise_px": 1.2})
+
+
+def real_servo(spec: ServoSpec, spread: float, random: np.random.Generator) -> ServoSpec:
+    """Return a servo as it comes out of the box: its figures a seeded share off the data sheet's."""
+    if spec.name == "ideal":
+        return spec
+    off = [1.0 + float(share) for share in random.uniform(-spread, spread, 3)]
+    return spec.replaced(
+        speed_rad_s=spec.speed_rad_s * (1.0 + 0.5 * (off[0] - 1.0)),
+        dead_band_rad=spec.dead_band_rad * off[1],
+        backlash_rad=spec.backlash_rad * off[2],
+        command_latency_s=max(spec.command_latency_s + float(random.uniform(-0.005, 0.005)), 0.0),
+    )
+
+
+def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np.random.Generator) -> Seeing:
+    """Return how the head sees in this run."""
+    boxes = scenario.given in ("boxes", "pairs")
+    frame_rate = scenario.given == "pairs"
+    return Seeing(
+        latency_s=setting.latency_ms * 1e-3,
+        skew_ticks=int(random.integers(0, 6)),
+        noise_px=realism.noise_px,
+        right_roll_rad=math.radians(random.uniform(-realism.roll_deg, realism.roll_deg)),
+        right_vertical_px=random.uniform(-realism.vertical_px, realism.vertical_px),
+        stamp_error_s=random.uniform(-realism.stamp_error_s, realism.stamp_error_s),
+        track=not boxes,
+        fovea=True,
+        boxes=boxes,
+        box_frame_ticks=10 if frame_rate else round(300.0 / realism.box["rate_hz"]),
+        box_latency_s=setting.latency_ms * 1e-3 + (0.0 if frame_rate else realism.box["latency_s"]),
+        box_noise_px=realism.noise_px if frame_rate else realism.box["noise_px"],
+        box_miss_share=0.0 if frame_rate else 0.05,
+    )
+
+
+def run(
+    scenario: Scenario,
+    setting: Setting,
+    realism: Realism | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> Trace:
+    """Run one scenario and return its trace."""
+    realism = Realism() if realism is None else realism
+    random = np.random.default_rng(scenario.seed + 7919)
+    servo = SERVOS[setting.servo]
+    rig: Rig = default_rig().with_servos(servo)
+    head = FakeHead(
+        rig,
+        scenario.target,
+        seeing_of(scenario, setting, realism, random),
+        scenario.seed,
+        scenario.start_rad,
+        lambda time_s: time_s >= 0.0 and scenario.visible(time_s),
+        scenario.clutter,
+        {name: real_servo(servo, realism.servo_spread, random) for name, _ in rig.joints.items()},
+        # The target appears at 0; the head has been awake for a while by then, at any phase of its frames.
+        begin_s=-TICK_S * int(random.integers(90, 120)),
+    )
+    controller = GazeController(rig, GazeParameters(law=setting.law, **dict(parameters or {})))
+    return _loop(head, controller, scenario)
+
+
+def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Trace:
+    arrived: list[Observation] = []
+    samples: list[tuple[float, Array, Array, Array, bool, int, tuple[float, float, float], float]] = []
+    first_result_s, travel_s, ticks, begun = math.inf, 0.0, 0, False
+    while head.time_s < scenario.duration_s:
+        arrived += head.advance()
+        ticks += 1
+        if ticks % CONTROL_TICKS:
+            continue
+        now_s = head.time_s
+        if now_s < 0.0:
+            controller.step(now_s, arrived)
+            arrived = []
+            continue
+        if not begun:
+            _begin(controller, scenario, head)
+            begun = True
+        if math.isinf(first_result_s) and any(_shows_target(observation) for observation in arrived):
+            first_result_s = now_s
+            travel_s = _travel_s(head)
+        began = time.perf_counter()
+        command = controller.step(now_s, arrived)
+        took_s = time.perf_counter() - began
+        arrived = []
+        if command.joints_rad is not None:
+            head.command(command.joints_rad)
+        report = command.report
+        position = report.target
+        samples.append(
+            (
+                now_s,
+                np.degrees(head.true_errors_rad()),
+                np.degrees(head.true_rad),
+                np.degrees(command.joints_rad) if command.joints_rad is not None else np.full(3, math.nan),
+                report.verged,
+                int(report.phase),
+                (position.distance_m, position.low_m, position.high_m),
+                took_s,
+            )
+        )
+    columns = list(zip(*samples, strict=True))
+    return Trace(
+        time_s=np.array(columns[0]),
+        errors_deg=np.array(columns[1]),
+        joints_deg=np.array(columns[2]),
+        commands_deg=np.array(columns[3]),
+        verged=np.array(columns[4]),
+        phase=np.array(columns[5]),
+        distance_m=np.array(columns[6]),
+        step_s=np.array(columns[7]),
+        first_result_s=first_result_s,
+        travel_s=travel_s,
+    )
+
+
+def _begin(controller: GazeController, scenario: Scenario, head: FakeHead) -> None:
+    if scenario.given == "click":
+        x, y = head.project(scenario.target(head.time_s), left=True)
+        goal = Goal(GoalKind.PIXEL, left_xy=(float(x), float(y)), time_limit_s=600.0)
+    else:
+        goal = Goal(GoalKind.CLASS, class_name="target", time_limit_s=600.0)
+    controller.look_at(goal, head.time_s)
+
+
+def _shows_target(observation: Observation) -> bool:
+    return isinstance(observation, BoxSighting) and observation.usable
+
+
+def _travel_s(head: FakeHead) -> float:
+    """How long the servos need at full speed, all at once, from here to the target."""
+    version, vergence, tilt = head.true_errors_rad()
+    ways = np.abs([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
+    speeds = np.array([joint.servo.speed_rad_s for _, joint in head.rig.joints.items()])
+    return float((ways / speeds).max())
+
+
+FIXATE = int(Phase.FIXATE)

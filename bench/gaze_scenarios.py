@@ -1,0 +1,202 @@
+"""Seeded scenarios for the gaze controller: where targets are, how they move, and where the eyes begin."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.gaze_runs import Scenario
+
+Array = npt.NDArray[np.float64]
+
+BASELINE_M = 0.065
+_HALF_FIELD_RAD = (math.atan(290.0 / 539.0), math.atan(210.0 / 539.0))
+
+
+def place(distance_m: float, azimuth_rad: float, elevation_rad: float) -> Array:
+    """Return a point (3,) at a distance and direction from between the eyes; azimuth left, elevation up positive."""
+    flat = math.cos(azimuth_rad)
+    return distance_m * np.array(
+        [flat * math.cos(elevation_rad), math.sin(azimuth_rad), flat * math.sin(elevation_rad)]
+    )
+
+
+def still(point_m: Array) -> Callable[[float], Array]:
+    """Return a target that stays."""
+    return lambda time_s: point_m
+
+
+def pans(point_m: Array) -> tuple[float, float, float]:
+    """Return pan_left, pan_right, tilt that fixate a point."""
+    x, y, z = point_m
+    forward = math.hypot(x, z)
+    return (
+        math.atan2(y - 0.5 * BASELINE_M, forward),
+        math.atan2(y + 0.5 * BASELINE_M, forward),
+        math.atan2(-z, x),
+    )
+
+
+def in_view_start(point_m: Array, random: np.random.Generator) -> dict[str, float]:
+    """Return a random pose from which both eyes see the point."""
+    left, right, tilt = pans(point_m)
+    while True:
+        version, vergence = random.uniform(-0.6, 0.6), random.uniform(0.01, 0.25)
+        pose = {
+            "pan_left": version - 0.5 * vergence,
+            "pan_right": version + 0.5 * vergence,
+            "tilt": random.uniform(-0.4, 0.4),
+        }
+        seen = (
+            abs(left - pose["pan_left"]) < _HALF_FIELD_RAD[0] - 0.02
+            and abs(right - pose["pan_right"]) < _HALF_FIELD_RAD[0] - 0.02
+            and abs(tilt - pose["tilt"]) < _HALF_FIELD_RAD[1] - 0.05
+        )
+        if seen:
+            return pose
+
+
+def fixating(point_m: Array) -> dict[str, float]:
+    """Return the pose that fixates a point."""
+    return dict(zip(("pan_left", "pan_right", "tilt"), pans(point_m), strict=True))
+
+
+def _random_place(random: np.random.Generator) -> Array:
+    # Uniform in vergence demand rather than in distance alone would crowd the near ones; half and half.
+    distance = random.uniform(0.25, 2.0)
+    return place(distance, math.radians(random.uniform(-35, 35)), math.radians(random.uniform(-20, 20)))
+
+
+def static(count: int, given: str, seed: int = 1) -> list[Scenario]:
+    """Targets at rest within 0.25 to 2 m, azimuth +-35 and elevation +-20 degrees; poses that see them."""
+    scenarios = []
+    for i in range(count):
+        random = np.random.default_rng([seed, i])
+        point = _random_place(random)
+        scenarios.append(Scenario(still(point), in_view_start(point, random), 3.0, given, seed=1000 * seed + i))
+    return scenarios
+
+
+def out_of_view(count: int, seed: int = 2) -> list[Scenario]:
+    """Targets anywhere in reach that neither eye sees at the start."""
+    scenarios: list[Scenario] = []
+    i = 0
+    while len(scenarios) < count:
+        random = np.random.default_rng([seed, i])
+        i += 1
+        azimuth, elevation = math.radians(random.uniform(-50, 50)), math.radians(random.uniform(-38, 38))
+        point = place(random.uniform(0.3, 2.0), azimuth, elevation)
+        left, right, tilt = pans(point)
+        if max(abs(left), abs(right)) > math.radians(58) or abs(tilt) > math.radians(44):
+            continue
+        version = random.uniform(-0.5, 0.5)
+        pose = {"pan_left": version - 0.03, "pan_right": version + 0.03, "tilt": random.uniform(-0.4, 0.4)}
+        aside = min(abs(left - pose["pan_left"]), abs(right - pose["pan_right"]))
+        if aside > _HALF_FIELD_RAD[0] + 0.1 or abs(tilt - pose["tilt"]) > _HALF_FIELD_RAD[1] + 0.1:
+            scenarios.append(Scenario(still(point), pose, 10.0, "boxes", seed=1000 * seed + i))
+    return scenarios
+
+
+def steps(count: int, given: str = "pairs", seed: int = 3) -> list[Scenario]:
+    """A fixated target that jumps sideways by 5 to 25 degrees at 1.5 s."""
+    scenarios = []
+    for i in range(count):
+        random = np.random.default_rng([seed, i])
+        distance, azimuth = random.uniform(0.4, 1.5), math.radians(random.uniform(-15, 15))
+        jump = math.radians(random.uniform(5, 25)) * random.choice([-1, 1])
+        before, after = place(distance, azimuth, 0.05), place(distance, azimuth + jump, 0.05)
+        scenarios.append(Scenario(_switch(before, after, 1.5), fixating(before), 3.5, given, seed=1000 * seed + i))
+    return scenarios
+
+
+def depth_steps(count: int, given: str = "pairs", seed: int = 4) -> list[Scenario]:
+    """A fixated target that jumps in depth at 1.5 s."""
+    scenarios = []
+    for i in range(count):
+        random = np.random.default_rng([seed, i])
+        azimuth = math.radians(random.uniform(-20, 20))
+        near, far = random.uniform(0.3, 0.6), random.uniform(0.9, 2.0)
+        pair = (near, far) if random.random() < 0.5 else (far, near)
+        before, after = (place(distance, azimuth, 0.0) for distance in pair)
+        scenarios.append(Scenario(_switch(before, after, 1.5), fixating(before), 3.5, given, seed=1000 * seed + i))
+    return scenarios
+
+
+def ramps(speeds_deg_s: tuple[float, ...], given: str = "pairs", seed: int = 5) -> list[Scenario]:
+    """Targets that move sideways at a constant speed from 1 s on, in both directions."""
+    scenarios = []
+    for i, speed in enumerate(speed for magnitude in speeds_deg_s for speed in (magnitude, -magnitude)):
+        begin = -math.copysign(30.0, speed)
+        travel_s = min(60.0 / abs(speed), 3.0)
+
+        def target(time_s: float, begin: float = begin, speed: float = speed, travel_s: float = travel_s) -> Array:
+            moved = speed * min(max(time_s - 1.0, 0.0), travel_s)
+            return place(0.8, math.radians(begin + moved), 0.05)
+
+        scenarios.append(Scenario(target, fixating(target(0.0)), 1.0 + travel_s, given, seed=1000 * seed + i))
+    return scenarios
+
+
+def sinusoids(frequencies_hz: tuple[float, ...], given: str = "pairs", seed: int = 6) -> list[Scenario]:
+    """Targets that swing +-10 degrees sideways and a little in depth."""
+    scenarios = []
+    for i, frequency in enumerate(frequencies_hz):
+
+        def target(time_s: float, frequency: float = frequency) -> Array:
+            phase = math.tau * frequency * max(time_s - 0.5, 0.0)
+            return place(0.8 + 0.1 * math.sin(0.5 * phase), math.radians(10.0) * math.sin(phase), 0.0)
+
+        duration = 0.5 + max(2.0 / frequency, 3.0)
+        scenarios.append(Scenario(target, fixating(target(0.0)), min(duration, 10.5), given, seed=1000 * seed + i))
+    return scenarios
+
+
+def occlusions(count: int, given: str = "pairs", seed: int = 7) -> list[Scenario]:
+    """A fixated target hidden for one second by something nearer that takes its place at the fovea."""
+    scenarios = []
+    for i in range(count):
+        random = np.random.default_rng([seed, i])
+        point = _random_place(random) + np.array([0.3, 0.0, 0.0])
+        scenarios.append(
+            Scenario(
+                still(point),
+                fixating(point),
+                4.5,
+                given,
+                seed=1000 * seed + i,
+                visible=lambda time_s: not 2.0 <= time_s < 3.0,
+                clutter=still(0.6 * point),
+            )
+        )
+    return scenarios
+
+
+def rig_turns(count: int, given: str = "pairs", seed: int = 8) -> list[Scenario]:
+    """The rig itself turns to and fro by 15 degrees at 0.3 Hz: in its own frame, the resting target circles it."""
+    scenarios = []
+    for i in range(count):
+        random = np.random.default_rng([seed, i])
+        point, phase = _random_place(random), random.uniform(0, math.tau)
+
+        def target(time_s: float, point: Array = point, phase: float = phase) -> Array:
+            turn = math.radians(7.5) * (math.sin(math.tau * 0.3 * time_s + phase) - math.sin(phase))
+            cosine, sine = math.cos(turn), math.sin(turn)
+            return np.array([cosine * point[0] - sine * point[1], sine * point[0] + cosine * point[1], point[2]])
+
+        scenarios.append(Scenario(target, fixating(point), 5.0, given, seed=1000 * seed + i))
+    return scenarios
+
+
+def at_distance(count: int, distance_m: float, given: str = "pairs", seed: int = 9) -> list[Scenario]:
+    """Targets at rest at one distance."""
+    scenarios = []
+    for i in range(count):
+        random = np.random.default_rng([seed, i])
+        point = place(distance_m, math.radians(random.uniform(-30, 30)), math.radians(random.uniform(-15, 15)))
+        scenarios.append(Scenario(still(point), in_view_start(point, random), 2.5, given, seed=1000 * seed + i))
+    return scenarios
+
+
+def _switch(before: Array, after: Array, at_s: float) -> Callable[[float], Array]:
+    return lambda time_s: before if time_s < at_s else after
