@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.alignment import Aligner, Alignment
 from vergence_metric.chance import chance_levels
 from vergence_metric.contrast import contrasts
 from vergence_metric.edge_distance import edge_distances
@@ -26,12 +27,13 @@ Figures = NDArray[np.float64]
 class EdgeMetricResult:
     """Everything measured on one pair; element i of each array belongs to `windows[i]`.
 
-    `left_grey` and `right_grey` (h, w) uint8 are what was compared: the right one is already aligned. Arrays carry the
-    names of vergence_msgs/EdgeVergence; figures are float64 and NaN where `status` (WindowStatus) says why. `stage_s`
-    holds the seconds that each stage took.
+    `left_grey` and `right_grey` (h, w) uint8 are what was compared: `alignment` is already taken out of the right one.
+    Arrays carry the names of vergence_msgs/EdgeVergence; figures are float64 and NaN where `status` (WindowStatus) says
+    why. `stage_s` holds the seconds that each stage took.
     """
 
     windows: tuple[Window, ...]
+    alignment: Alignment
     left_grey: Grey
     right_grey: Grey
     left_edges: Edges
@@ -61,6 +63,7 @@ class EdgeMetric:
 
     def __init__(self, parameters: EdgeMetricParameters) -> None:
         self.parameters = parameters
+        self._aligner = Aligner(parameters)
 
     def measure(self, left: NDArray[Any], right: NDArray[Any]) -> EdgeMetricResult:
         """Measure a pair of (h, w, 3) BGR or (h, w) grey uint8 images of one size.
@@ -72,6 +75,9 @@ class EdgeMetric:
         p, stage_s = self.parameters, dict[str, float]()
         with _timed(stage_s, "grey"):
             left_grey, right_grey = to_grey(left), to_grey(right)
+        with _timed(stage_s, "alignment"):
+            alignment = self._aligner.update(left_grey, right_grey)
+            right_grey = alignment.apply(right_grey)
         with _timed(stage_s, "edges"):
             left_edges, right_edges = detect_edges(left_grey, p), detect_edges(right_grey, p)
         windows = centre_windows(p.windows_px, *left_grey.shape)
@@ -94,6 +100,7 @@ class EdgeMetric:
         rank = np.argsort(np.argsort([window.size_px for window in windows]))  # oriented figures are sorted by size
         return EdgeMetricResult(
             windows,
+            alignment,
             left_grey,
             right_grey,
             left_edges,

@@ -57,6 +57,38 @@ class EdgeMetricParameters(Parameters):
     fovea_sigma_px: float = parameter(
         20.0, "robust form: Gaussian weight of edge pixels around the image centre", unit="px", minimum=1.0
     )
+    align: str = parameter(
+        "auto", "how vertical offset and roll between the eyes are taken out of the right image", choices=ALIGN_MODES
+    )
+    align_vertical_px: float = parameter(
+        0.0, "align calibrated: y_left - y_right at the image centre", unit="px", minimum=-200.0, maximum=200.0
+    )
+    align_roll_deg: float = parameter(
+        0.0, "align calibrated: the right image's rotation, clockwise positive", unit="deg", minimum=-20.0, maximum=20.0
+    )
+    align_max_vertical_px: float = parameter(
+        24.0, "align auto: no larger offset is taken out", unit="px", minimum=0.0, maximum=200.0
+    )
+    align_max_roll_deg: float = parameter(
+        4.0, "align auto: no larger rotation is taken out", unit="deg", minimum=0.0, maximum=20.0
+    )
+    align_search_px: int = parameter(
+        200, "align auto: horizontal disparities are searched to this on both sides", unit="px", minimum=8, maximum=4096
+    )
+    align_every_pairs: int = parameter(
+        15, "align auto: after the first few pairs, estimate on one pair in so many", minimum=1, maximum=100000
+    )
+    verged_contrast: float = parameter(
+        0.6, "verged: at most this mean contrast of the windows from 50 to 100 px", minimum=0.0, maximum=2.0
+    )
+    verged_leave_contrast: float = parameter(0.72, "verged: above this contrast it ends", minimum=0.0, maximum=2.0)
+    verged_px: float = parameter(2.0, "verged: at most this signed error", unit="px", minimum=0.0, maximum=1000.0)
+    verged_leave_px: float = parameter(
+        4.0, "verged: above this signed error it ends", unit="px", minimum=0.0, maximum=1000.0
+    )
+    verged_confidence: float = parameter(
+        0.5, "verged: signed errors of less confidence are taken for unknown", minimum=0.0, maximum=1.0
+    )
 
     def check(self) -> None:
         """Raise ParameterError where two parameters do not fit together."""
@@ -66,3 +98,6 @@ class EdgeMetricParameters(Parameters):
             raise ParameterError("windows_px", self.windows_px, "windows that differ from one another")
         if self.canny_low > self.canny_high:
             raise ParameterError("canny_low", self.canny_low, f"at most canny_high ({self.canny_high:g})")
+        for enter, leave in (("verged_contrast", "verged_leave_contrast"), ("verged_px", "verged_leave_px")):
+            if getattr(self, leave) < getattr(self, enter):
+                raise ParameterError(leave, getattr(self, leave), f"at least {enter} ({getattr(self, enter):g})")

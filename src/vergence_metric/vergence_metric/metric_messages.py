@@ -31,9 +31,10 @@ def edge_message(result: EdgeMetricResult, header: Header, pair_skew_s: float) -
         robust_left_to_right_px=result.robust_left_to_right_px,
         robust_right_to_left_px=result.robust_right_to_left_px,
         status=result.status,
-        align_mode="none",
-        align_vertical_px=math.nan,
-        align_roll_rad=math.nan,
+        align_mode=result.alignment.mode,
+        align_vertical_px=result.alignment.vertical_px,
+        align_roll_rad=result.alignment.roll_rad,
+        align_bounded=result.alignment.bounded,
     )
 
 
