@@ -43,7 +43,7 @@ def make_pixels() -> Callable[..., Pixels]:
 def mjpeg_avi(tmp_path: Path) -> Path:
     """Motion JPEG in an AVI, written by OpenCV: 10 frames of 320x240 at 25 Hz."""
     path = tmp_path / "mjpeg.avi"
-    writer = cv2.VideoWriter(str(path), cv2.CAP_OPENCV_MJPEG, cv2.VideoWriter_fourcc(*"MJPG"), 25.0, (320, 240))
+    writer = cv2.VideoWriter(str(path), cv2.CAP_OPENCV_MJPEG, cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (320, 240))
     assert writer.isOpened()
     for number in range(10):
         writer.write(textured(number, 320, 240))
@@ -82,14 +82,14 @@ class FakeMachine:
         bus = port.partition("-")[0]
         usb = self.sys / "devices" / "pci0000:00" / controller / f"usb{bus}" / port
         interface = usb / f"{port}:1.0"
-        for directory, entry, text in (
+        for directory, file, text in (
             (usb, "idVendor", vendor),
             (usb, "idProduct", product),
             (usb, "speed", speed),
             *([(usb, "serial", serial)] if serial else []),
         ):
             directory.mkdir(parents=True, exist_ok=True)
-            (directory / entry).write_text(text + "\n")
+            (directory / file).write_text(text + "\n")
         for index, offset in enumerate((0, 1) if metadata_too else (0,)):
             node = f"video{number + offset}"
             video = interface / "video4linux" / node

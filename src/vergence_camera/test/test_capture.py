@@ -3,6 +3,7 @@
 import errno
 import time
 from collections.abc import Callable
+from ctypes import Structure
 
 import numpy as np
 import pytest
@@ -279,7 +280,7 @@ def test_what_is_offered(kernel: FakeKernel) -> None:
 def test_a_driver_without_rates(kernel: FakeKernel, monkeypatch: pytest.MonkeyPatch) -> None:
     answer = kernel.ioctl
 
-    def without_rates(descriptor: int, request: int, argument: v4l2.Structure) -> None:
+    def without_rates(descriptor: int, request: int, argument: Structure) -> None:
         if request in (v4l2.G_PARM, v4l2.S_PARM):
             raise OSError(errno.ENOTTY, "Inappropriate ioctl for device")
         answer(descriptor, request, argument)

@@ -1,5 +1,6 @@
 """Recordings come at their rate, loop or end, and say when they are broken."""
 
+import itertools
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -60,7 +61,7 @@ def test_an_avi_passes_its_bytes_through_at_its_own_rate(mjpeg_avi: Path) -> Non
     frames = list(frames_of(source, 10))
     assert all(frame.encoding is Encoding.JPEG and frame.clock is Clock.MONOTONIC for frame in frames)
     assert all(isinstance(frame.data, bytes) and frame.data in content for frame in frames)
-    assert {b.time_ns - a.time_ns for a, b in zip(frames, frames[1:], strict=False)} == {40_000_000}
+    assert {b.time_ns - a.time_ns for a, b in itertools.pairwise(frames)} == {40_000_000}
 
 
 @pytest.mark.parametrize("rate_hz", [5.0, 100.0])
@@ -77,7 +78,7 @@ def test_loops_without_a_break_in_sequence_or_rate(mjpeg_avi: Path) -> None:
     frames = list(frames_of(source, 25))
     assert [frame.sequence for frame in frames] == list(range(25))
     assert frames[0].data == frames[10].data == frames[20].data
-    assert {b.time_ns - a.time_ns for a, b in zip(frames, frames[1:], strict=False)} == {40_000_000}
+    assert {b.time_ns - a.time_ns for a, b in itertools.pairwise(frames)} == {40_000_000}
 
 
 def test_ends_when_it_is_to_be_played_once(mjpeg_avi: Path) -> None:
@@ -103,7 +104,7 @@ def test_a_long_hold_up_does_not_make_it_race(mjpeg_avi: Path) -> None:
 def test_reopening_begins_anew(mjpeg_avi: Path) -> None:
     source = replay(mjpeg_avi)
     source.open()
-    first = list(frames_of(source, 4))[0]
+    first, *_ = frames_of(source, 4)
     source.open()
     assert next(frames_of(source, 1)).data == first.data
     source.close()
@@ -272,7 +273,7 @@ def test_other_containers_are_decoded(
     tmp_path: Path, make_pixels: Callable[..., np.ndarray], code: str, suffix: str
 ) -> None:
     path = tmp_path / f"clip{suffix}"
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*code), 20.0, (160, 96))
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*code), 20.0, (160, 96))
     if not writer.isOpened():
         pytest.skip(f"this OpenCV cannot write {code}")
     for number in range(6):
@@ -286,7 +287,7 @@ def test_other_containers_are_decoded(
 
 def test_a_truncated_video_is_said(tmp_path: Path, make_pixels: Callable[..., np.ndarray]) -> None:
     path = tmp_path / "clip.avi"
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"XVID"), 20.0, (160, 96))
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"XVID"), 20.0, (160, 96))
     for number in range(40):
         writer.write(make_pixels(number, 160, 96))
     writer.release()
