@@ -60,6 +60,7 @@ class StationRunner:
         self._look_at_angles(station)
         recorder.settle(_SETTLE_S, self._alive)
         recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._alive)
+        recorder.set_parameters("sim_node", {"target": station.target, **station.motion}, self._alive)
         self._show(station, station.place_m or self._fixation_m())
         shown_at = recorder.now_s()
         truth = recorder.wait_for(
@@ -77,7 +78,7 @@ class StationRunner:
         after = recorder.picture(self._alive)
         self._store(station, "end", after)
         if station.moving:
-            recorder.set_parameters("sim_node", {"motion.kind": "static"}, self._alive)
+            recorder.set_parameters("sim_node", {"motion": "static"}, self._alive)
         return self._result(station, began, marks, reason, before, after)
 
     def _show(self, station: Station, place_m: Sequence[float]) -> None:

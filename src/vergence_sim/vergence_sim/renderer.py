@@ -3,6 +3,7 @@
 import os
 from typing import Any
 
+import cv2
 import mujoco
 import numpy as np
 import numpy.typing as npt
@@ -51,7 +52,7 @@ class EyeRenderer:
         mujoco.mjr_render(self._viewport, self._scene, self._mjr)
         mujoco.mjr_readPixels(self._rgb, None, self._viewport, self._mjr)
         # OpenGL's rows run upwards and its channels are RGB.
-        return np.ascontiguousarray(self._rgb[::-1, :, ::-1])
+        return np.asarray(cv2.cvtColor(cv2.flip(self._rgb, 0), cv2.COLOR_RGB2BGR), np.uint8)
 
     def close(self) -> None:
         """Free what was allocated; twice is once."""

@@ -191,9 +191,10 @@ class SceneBuilder:
 def build_scene(rig: Rig, parameters: SimParameters, fovy_rad: float) -> mujoco.MjModel:
     """Return the compiled room with head and targets; `fovy_rad` is the rendered views' vertical field of view."""
     builder = SceneBuilder(rig, parameters.world_seed, parameters.samples)
-    builder.room()
-    builder.furniture()
+    # Near things first: what is drawn behind them is never textured.
     builder.targets()
+    builder.furniture()
+    builder.room()
     mounts = {
         "left": (parameters.left_roll_rad, 0.0),
         "right": (parameters.right_roll_rad, parameters.right_pitch_rad),

@@ -12,7 +12,7 @@ from vergence_sim.optics import Lens
 
 Array = npt.NDArray[np.float64]
 
-_GRID = 9
+_GRID = 6
 _SAME_SURFACE_M = 1e-3
 
 
