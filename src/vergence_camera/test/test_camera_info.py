@@ -143,6 +143,6 @@ def test_other_urls_are_refused(url: str) -> None:
 
 def test_an_unwritable_place_leaves_nothing_behind(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
-    with pytest.raises(NotADirectoryError):
+    with pytest.raises(FileExistsError):
         save_calibration(Calibration(640, 480, K, D), tmp_path / "file" / "left.yaml")
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]

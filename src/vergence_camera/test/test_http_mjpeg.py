@@ -40,15 +40,14 @@ def next_frame(source: HttpMjpegSource, within_s: float = 5.0) -> Frame:
     raise AssertionError("no frame came")
 
 
-def until_disconnected(source: HttpMjpegSource, reason: str) -> list[object]:
-    """Read until the stream breaks for `reason`; return the data of all frames."""
-    received = []
+def until_disconnected(source: HttpMjpegSource) -> tuple[list[object], str]:
+    """Read until the stream breaks; return the data of all frames, and the reason."""
+    received: list[object] = []
     while True:
         try:
             frame = source.read(0.1)
         except DisconnectedError as error:
-            assert reason in str(error)
-            return received
+            return received, str(error)
         if frame is not None:
             received.append(frame.data)
 
@@ -89,7 +88,8 @@ def test_a_chunked_body_in_slow_slices(http_server: Serve, make_jpeg: Make) -> N
 
     source = source_of(http_server(script).url)
     source.open()
-    received = until_disconnected(source, "ended the stream")
+    received, reason = until_disconnected(source)
+    assert "ended the stream" in reason
     # Small pictures may come two at a time: then only the newest is wanted.
     assert received[-1] == make_jpeg(2, 64, 48)
     assert set(received) <= {make_jpeg(number, 64, 48) for number in range(3)}
@@ -135,7 +135,9 @@ def test_a_cut_connection_is_said_after_what_came(http_server: Serve, make_jpeg:
 
     source = source_of(http_server(script).url)
     source.open()
-    assert until_disconnected(source, "closed the stream")[-1] == make_jpeg(2)
+    received, reason = until_disconnected(source)
+    assert received[-1] == make_jpeg(2)
+    assert "closed the stream" in reason
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ class HttpStream:
         self._timeout_s = timeout_s
         self._socket: socket.socket | None = None
         self._body = bytearray()
+        self._broken: DisconnectedError | None = None
         self.headers: dict[str, str] = {}
         self._chunks: _Dechunker | None = None
         for _ in range(6):
@@ -41,7 +42,20 @@ class HttpStream:
             raise DisconnectedError(reason)
 
     def read(self, timeout_s: float) -> bytes | None:
-        """Return what has come, or None if nothing came in time; raise DisconnectedError when the server has ended."""
+        """Return what has come, or None if nothing came in time.
+
+        Raises:
+            DisconnectedError: the server has ended the stream, or the connection broke; again at every further call.
+        """
+        if self._broken is not None:
+            raise DisconnectedError(str(self._broken))
+        try:
+            return self._read(timeout_s)
+        except DisconnectedError as error:
+            self._broken = error
+            raise
+
+    def _read(self, timeout_s: float) -> bytes | None:
         if self._body:
             data, self._body = bytes(self._body), bytearray()
             return self._dechunked(data)
