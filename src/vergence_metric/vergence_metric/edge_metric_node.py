@@ -66,20 +66,22 @@ class EdgeMetricNode(Node):
 
     def _measure(self, pair: ImagePair) -> None:
         self._measurement.set_parameters(self._settings.value)
+        header, skew_s = pair.left.header, pair.skew_ns * 1e-9
+        models = self._stereo.models_for(pair.left.pixels)
         with self._times.measure("metric"):
             edge = self._measurement.edge(pair.left.pixels, pair.right.pixels)
-        header, skew_s = pair.left.header, pair.skew_ns * 1e-9
-        with self._times.measure("publish"):
-            self._edge_publisher.publish(edge_message(edge, header, skew_s))
-        self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
-        self._times.add_all(edge.stage_s)
-        models = self._stereo.models_for(pair.left.pixels)
         with self._times.measure("disparity"):
             disparity = self._measurement.disparity(edge)
         angular = models and angular_disparity(
             *models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px
         )
-        self._error_publisher.publish(error_message(disparity, angular, header, skew_s))
+        with self._times.measure("publish"):
+            error = error_message(disparity, angular, header, skew_s)
+            verged = self._measurement.verged(edge, error.horizontal_px, error.confidence)
+            self._edge_publisher.publish(edge_message(edge, verged, header, skew_s))
+            self._error_publisher.publish(error)
+        self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
+        self._times.add_all(edge.stage_s)
         self._publish_track(pair, edge, models)
         if self._overlay_publisher.get_subscription_count():
             with self._times.measure("overlay"):
@@ -92,7 +94,7 @@ class EdgeMetricNode(Node):
             eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
             track = self._measurement.track(edge, pair.left_stamp_ns * 1e-9, eyes, models)
         angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
-        self._track_publisher.publish(track_message(track, angular, pair.left.header, pair.skew_ns * 1e-9))
+        self._track_publisher.publish(track_message(track, edge, angular, pair.left.header, pair.skew_ns * 1e-9))
 
     def _on_failure(self, error: Exception) -> None:
         self._failure = f"{type(error).__name__}: {error}"

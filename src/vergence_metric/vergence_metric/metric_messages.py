@@ -13,8 +13,8 @@ from vergence_metric.viewing_angles import AngularDisparity
 from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
 
 
-def edge_message(result: EdgeMetricResult, header: Header, pair_skew_s: float) -> EdgeVergence:
-    """Return metric I of a pair; `header` is the left image's."""
+def edge_message(result: EdgeMetricResult, verged: bool, header: Header, pair_skew_s: float) -> EdgeVergence:
+    """Return metric I of a pair and whether it is judged verged; `header` is the left image's."""
     return EdgeVergence(
         header=header,
         pair_skew_s=pair_skew_s,
@@ -61,8 +61,12 @@ def error_message(
     return message
 
 
-def track_message(track: Track, angular: AngularDisparity | None, header: Header, pair_skew_s: float) -> TargetTrack:
-    """Return where the target is; `angular` is None while the cameras are not described."""
+def track_message(
+    track: Track, result: EdgeMetricResult, angular: AngularDisparity | None, header: Header, pair_skew_s: float
+) -> TargetTrack:
+    """Return where the target is in the images as they were taken; `angular` is None without camera models."""
+    height, width = result.left_grey.shape
+    right_x_px, right_y_px = result.alignment.unaligned(*track.right_px, width, height)
     return TargetTrack(
         header=header,
         pair_skew_s=pair_skew_s,
@@ -70,8 +74,8 @@ def track_message(track: Track, angular: AngularDisparity | None, header: Header
         lock_stamp=to_stamp(track.lock_stamp_s if math.isfinite(track.lock_stamp_s) else 0.0),
         left_x_px=track.left_px[0],
         left_y_px=track.left_px[1],
-        right_x_px=track.right_px[0],
-        right_y_px=track.right_px[1],
+        right_x_px=right_x_px,
+        right_y_px=right_y_px,
         disparity_px=track.disparity_px if angular is None else angular.horizontal_px,
         disparity_rad=math.nan if angular is None else angular.horizontal_rad,
         sigma_px=track.sigma_px,

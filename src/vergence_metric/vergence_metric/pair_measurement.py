@@ -10,6 +10,7 @@ from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
 from vergence_metric.tracker import TargetTracker, Track, TrackStatus
+from vergence_metric.verged import VergedJudge, judged_contrast
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import Rig
@@ -47,6 +48,10 @@ class PairMeasurement:
         """Return the signed disparity at the left image's centre of a pair measured by `edge`."""
         return self._estimator.estimate(edge.left_grey, edge.right_grey)
 
+    def verged(self, edge: EdgeMetricResult, error_px: float, confidence: float) -> bool:
+        """Tell whether the eyes are verged, by the contrast and the signed error of a pair, and by the last verdict."""
+        return self._judge.update(judged_contrast(edge.windows_px, edge.contrast), error_px, confidence)
+
     def track(self, edge: EdgeMetricResult, stamp_s: float, eyes: EyeAngles | None, models: Models | None) -> Track:
         """Return where the target is in a pair measured by `edge`.
 
@@ -73,6 +78,7 @@ class PairMeasurement:
         self._parameters = parameters
         self._metric = EdgeMetric(parameters)
         self._estimator = make_estimator(parameters)
+        self._judge = VergedJudge(parameters)
         self._tracker = None
 
     def _nothing(self, reason: str) -> Track:
