@@ -61,6 +61,8 @@ class HttpStream:
             return self._dechunked(data)
         if self._socket is None:
             raise DisconnectedError("the stream is closed")
+        if self._chunks is not None and self._chunks.ended:
+            raise DisconnectedError("the server ended the stream")
         pending = isinstance(self._socket, ssl.SSLSocket) and self._socket.pending()
         if not pending and not select.select([self._socket], [], [], max(0.0, timeout_s))[0]:
             return None
@@ -85,10 +87,7 @@ class HttpStream:
     def _dechunked(self, data: bytes) -> bytes:
         if self._chunks is None:
             return data
-        body = self._chunks.feed(data)
-        if self._chunks.ended and not body:
-            raise DisconnectedError("the server ended the stream")
-        return body
+        return self._chunks.feed(data)
 
     def _request(self, url: str) -> int:
         parts = urlsplit(url)
