@@ -1,0 +1,146 @@
+"""Hardware PWM through the kernel's /sys/class/pwm: 2 channels on a Raspberry Pi up to 4, 4 on a Pi 5.
+
+The pulses are made by hardware and do not jitter. They go on when the process dies, however it dies: `servo_node` has
+a guardian process for that.
+"""
+
+import errno
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from vergence_rig.parameters import Parameters, parameter
+from vergence_servo.drivers.protocol import ChannelError, DriverIoError, DriverUnavailableError
+
+_OVERLAY = "dtoverlay=pwm-2chan,pin=12,func=4,pin2=13,func2=4"
+_BOOT_LINE = f"add '{_OVERLAY}' to /boot/firmware/config.txt and reboot"
+_GROUP = "sudo usermod -aG gpio $USER, then log in anew"
+# The PWM blocks behind the header's pins: BCM2835 to 2837, BCM2711 (Pi 4), RP1 (Pi 5).
+_HEADER_BLOCKS = ("20203000.pwm", "3f20c000.pwm", "7e20c000.pwm", "fe20c000.pwm", "1f00098000.pwm")
+_UDEV_PATIENCE_S = 2.0
+
+
+@dataclass(frozen=True)
+class KernelPwmParameters(Parameters):
+    """Which PWM chip, and its period."""
+
+    root: str = parameter("/sys/class/pwm", "folder of the kernel's PWM chips", read_only=True)
+    chip: int = parameter(
+        -1, "number of the pwmchip; -1 finds the one behind the header's pins", minimum=-1, maximum=99, read_only=True
+    )
+    frequency_hz: float = parameter(50.0, "pulses a second", unit="Hz", minimum=20, maximum=400, read_only=True)
+
+
+class KernelPwmDriver:
+    """Pulses from the chip's channels, set in nanoseconds."""
+
+    outlives_process = True
+    # sysfs takes nanoseconds; the hardware counts its 100 MHz (Pi 4) or 50 MHz (Pi 5) clock.
+    resolution_us = 0.02
+
+    def __init__(self, parameters: KernelPwmParameters | None = None) -> None:
+        values = parameters or KernelPwmParameters()
+        self._chip = _find_chip(Path(values.root), values.chip)
+        self._count = _read_count(self._chip)
+        self._period_ns = round(1e9 / values.frequency_hz)
+        self._enabled: set[int] = set()
+
+    def set_pulse_us(self, channel: int, pulse_us: float) -> float:
+        """See ServoDriver; the channel is exported and its period set when it is first used."""
+        folder = self._folder(channel)
+        pulse_ns = round(pulse_us / self.resolution_us) * round(self.resolution_us * 1000)
+        if not 0 < pulse_ns < self._period_ns:
+            raise DriverIoError(errno.EINVAL, f"pulse of {pulse_us} us does not fit the period", str(folder))
+        try:
+            if channel not in self._enabled:
+                self._prepare(channel, folder)
+            _write(folder / "duty_cycle", pulse_ns)
+            if channel not in self._enabled:
+                _write(folder / "enable", 1)
+        except OSError as error:
+            self._enabled.discard(channel)
+            raise _explained(error) from error
+        self._enabled.add(channel)
+        return pulse_ns / 1000
+
+    def release(self, channel: int) -> None:
+        """See ServoDriver. The pulse in progress is finished: the width is set to nothing before the channel is cut."""
+        folder = self._folder(channel)
+        self._enabled.discard(channel)
+        if not folder.is_dir():
+            return
+        try:
+            _write(folder / "duty_cycle", 0)
+            _write(folder / "enable", 0)
+        except OSError as error:
+            raise _explained(error) from error
+
+    def close(self) -> None:
+        """See ServoDriver. Channels stay exported: unexporting would give the pin no defined state."""
+        for channel in tuple(self._enabled):
+            try:
+                self.release(channel)
+            except DriverIoError:
+                continue  # nothing more can be done for a chip that is gone
+
+    def _folder(self, channel: int) -> Path:
+        if not 0 <= channel < self._count:
+            raise ChannelError(
+                f"channel is {channel}: allowed is 0 to {self._count - 1} ({self._chip}; GPIO 12, 13, 18, 19 are "
+                f"channels 0, 1, 2, 3 on a Pi 5 and 0, 1, 0, 1 before)"
+            )
+        return self._chip / f"pwm{channel}"
+
+    def _prepare(self, channel: int, folder: Path) -> None:
+        if not folder.is_dir():
+            _write(self._chip / "export", channel)
+        deadline_s = time.monotonic() + _UDEV_PATIENCE_S
+        while True:
+            try:
+                _write(folder / "duty_cycle", 0)  # the kernel refuses a period below the present width
+                break
+            except (PermissionError, FileNotFoundError):
+                # udev hands a new channel to the group gpio a moment after it appears
+                if time.monotonic() > deadline_s:
+                    raise
+                time.sleep(0.01)
+        _write(folder / "period", self._period_ns)
+
+
+def _find_chip(root: Path, number: int) -> Path:
+    chips = sorted(root.glob("pwmchip*"), key=lambda path: int(path.name.removeprefix("pwmchip")))
+    if not chips:
+        raise DriverUnavailableError(f"backend 'kernel_pwm': no PWM chip in {root}: {_BOOT_LINE}")
+    if number >= 0:
+        chip = root / f"pwmchip{number}"
+        if chip not in chips:
+            there = ", ".join(path.name.removeprefix("pwmchip") for path in chips)
+            raise DriverUnavailableError(f"kernel_pwm.chip is {number}: allowed is one of {there} (in {root})")
+        return chip
+    of_header = [chip for chip in chips if (chip / "device").resolve().name in _HEADER_BLOCKS]
+    if len(of_header or chips) == 1:
+        return (of_header or chips)[0]
+    names = ", ".join(chip.name for chip in of_header or chips)
+    raise DriverUnavailableError(f"backend 'kernel_pwm': {names} in {root}: choose one with kernel_pwm.chip")
+
+
+def _read_count(chip: Path) -> int:
+    try:
+        return int((chip / "npwm").read_text())
+    except (OSError, ValueError) as error:
+        raise DriverUnavailableError(f"backend 'kernel_pwm': {chip}/npwm cannot be read: {error}") from error
+
+
+def _write(path: Path, value: int) -> None:
+    # Opened each time: a channel may be unexported and exported again by others. sysfs ignores truncation.
+    with open(path, "wb", buffering=0) as attribute:
+        attribute.write(b"%d\n" % value)
+
+
+def _explained(error: OSError) -> DriverIoError:
+    text = error.strerror or str(error)
+    if isinstance(error, PermissionError):
+        text += f" ({_GROUP})"
+    elif error.errno == errno.EBUSY:
+        text += " (another program or overlay holds this PWM channel; analogue audio does on a Pi 4)"
+    return DriverIoError(error.errno or errno.EIO, text, error.filename)

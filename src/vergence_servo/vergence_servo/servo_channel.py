@@ -1,0 +1,130 @@
+"""One servo on one channel: released, pulsing or failed, and where it is believed to be."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from vergence_rig.servo import ServoPlant, ServoSpec
+from vergence_servo.calibration import ServoLimits
+from vergence_servo.drivers.protocol import DriverIoError, ServoDriver
+from vergence_servo.safety import safe_pulse_us
+
+
+class ChannelState(Enum):
+    """What a channel does."""
+
+    RELEASED = "released"
+    PULSING = "pulsing"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class BackOff:
+    """Waits between attempts at a failed channel: doubling from the first to the longest [s]."""
+
+    first_s: float
+    longest_s: float
+
+
+class ServoChannel:
+    """Sends pulses through `safe_pulse_us` alone, and stops, reports and retries where the backend fails."""
+
+    def __init__(
+        self,
+        name: str,
+        limits: ServoLimits,
+        spec: ServoSpec,
+        driver: ServoDriver,
+        believed_rad: float,
+        back_off: BackOff,
+        now_s: float,
+    ) -> None:
+        self.name = name
+        self.limits = limits
+        self.back_off = back_off
+        self.state = ChannelState.RELEASED
+        self.fault = ""
+        self.fault_count = 0
+        self.retry_s = 0.0
+        self._driver = driver
+        self._channel = limits.calibration.channel
+        self._wait_s = back_off.first_s
+        self._pulse_us = safe_pulse_us(
+            believed_rad, limits.calibration.pulse_us(believed_rad), 0.0, limits, driver.resolution_us
+        )
+        self._sent_s = now_s
+        self._well_since_s = now_s
+        self._plant = ServoPlant(spec, self.sent_rad, now_s)
+
+    @property
+    def sent_rad(self) -> float:
+        """The joint angle of the pulse sent last, or believed before the first [rad]."""
+        return self.limits.calibration.joint_rad(self._pulse_us)
+
+    @property
+    def pulse_us(self) -> float | None:
+        """The pulse being sent [us]; None where there is none."""
+        return self._pulse_us if self.state is ChannelState.PULSING else None
+
+    def modelled_rad(self, now_s: float) -> float:
+        """Return where the servo should have got to by now [rad]: hobby servos do not tell."""
+        self._plant.step(now_s)
+        return self._plant.modelled_rad
+
+    def attach(self, now_s: float) -> None:
+        """Begin to send pulses, where the servo is believed to be."""
+        self._send(self._pulse_us, now_s)
+
+    def drive(self, wanted_rad: float, now_s: float, speed_rad_s: float) -> None:
+        """Send what is safe on the way to `wanted_rad` [rad]. A channel that does not pulse stays as it is."""
+        if self.state is not ChannelState.PULSING:
+            return
+        pulse_us = safe_pulse_us(
+            wanted_rad, self._pulse_us, now_s - self._sent_s, self.limits, self._driver.resolution_us, speed_rad_s
+        )
+        if pulse_us != self._pulse_us:
+            self._send(pulse_us, now_s)
+        elif now_s - self._well_since_s > self._wait_s:
+            self._wait_s = self.back_off.first_s
+
+    def arrived(self, wanted_rad: float) -> bool:
+        """Tell whether the pulse sent is the one nearest to `wanted_rad` [rad] that may be sent."""
+        goal_us = safe_pulse_us(wanted_rad, self._pulse_us, 1e9, self.limits, self._driver.resolution_us)
+        near_us = 1.001 * self._driver.resolution_us
+        return abs(goal_us - self._pulse_us) <= near_us and abs(self._way_us(wanted_rad)) <= near_us
+
+    def release(self, now_s: float) -> None:
+        """Stop the pulses. Where even that fails the channel is FAILED, and released again later."""
+        try:
+            self._driver.release(self._channel)
+        except DriverIoError as error:
+            self._failed(error, now_s)
+            return
+        self.state = ChannelState.RELEASED
+
+    def _way_us(self, wanted_rad: float) -> float:
+        wanted_us = self.limits.calibration.pulse_us(wanted_rad)
+        return min(max(wanted_us, self.limits.minimum_us), self.limits.maximum_us) - self._pulse_us
+
+    def _send(self, pulse_us: float, now_s: float) -> None:
+        try:
+            self._driver.set_pulse_us(self._channel, pulse_us)
+        except DriverIoError as error:
+            self._failed(error, now_s)
+            try:
+                self._driver.release(self._channel)
+            except DriverIoError:
+                return  # release is tried again with the next attempt
+            return
+        if self.state is not ChannelState.PULSING:
+            self._well_since_s = now_s
+            self.fault = ""
+        self.state = ChannelState.PULSING
+        self._pulse_us, self._sent_s = pulse_us, now_s
+        self._plant.command(self.sent_rad, now_s)
+
+    def _failed(self, error: DriverIoError, now_s: float) -> None:
+        self.state = ChannelState.FAILED
+        self.fault = str(error)
+        self.fault_count += 1
+        self.retry_s = now_s + self._wait_s
+        self._wait_s = min(2 * self._wait_s, self.back_off.longest_s)

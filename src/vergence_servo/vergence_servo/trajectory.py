@@ -1,0 +1,96 @@
+"""Joint trajectories: points in time, interpolated."""
+
+import bisect
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from vergence_servo.command_guard import MalformedCommandError, UnknownJointError
+
+
+@dataclass(frozen=True)
+class TrajectoryPoint:
+    """Positions [rad] and, if given, velocities [rad/s] of all joints of a trajectory, `time_s` after its start."""
+
+    time_s: float
+    positions_rad: tuple[float, ...]
+    velocities_rad_s: tuple[float, ...] | None = None
+
+
+class Trajectory:
+    """A checked trajectory that starts from where the joints are.
+
+    Between points with velocities it is a cubic Hermite spline, otherwise a straight line.
+    """
+
+    def __init__(
+        self, joints: Sequence[str], points: Sequence[TrajectoryPoint], present_rad: Mapping[str, float]
+    ) -> None:
+        """Check and take it.
+
+        Args:
+            joints: the names, each once.
+            points: with rising times.
+            present_rad: where every driven joint is now; it is the point at time 0 unless there is one.
+
+        Raises:
+            MalformedCommandError: lengths that do not fit, times that do not rise, values that are not finite.
+            UnknownJointError: a joint that is not in `present_rad`.
+        """
+        _check(joints, points, tuple(present_rad))
+        self.joints = tuple(joints)
+        start = TrajectoryPoint(0.0, tuple(present_rad[name] for name in joints), (0.0,) * len(joints))
+        self._points = list(points) if points[0].time_s == 0 else [start, *points]
+        self._times_s = [point.time_s for point in self._points]
+
+    @property
+    def duration_s(self) -> float:
+        """When the last point is reached, after the start [s]."""
+        return self._times_s[-1]
+
+    def positions_rad(self, time_s: float) -> dict[str, float]:
+        """Return where the joints should be, `time_s` after the start; before it the first point, after it the last."""
+        if time_s >= self.duration_s:
+            return dict(zip(self.joints, self._points[-1].positions_rad, strict=True))
+        i = max(bisect.bisect_right(self._times_s, time_s) - 1, 0)
+        if time_s <= 0 or i + 1 >= len(self._points):
+            return dict(zip(self.joints, self._points[0].positions_rad, strict=True))
+        before, after = self._points[i], self._points[i + 1]
+        return {name: _between(before, after, j, time_s) for j, name in enumerate(self.joints)}
+
+
+def _between(before: TrajectoryPoint, after: TrajectoryPoint, joint: int, time_s: float) -> float:
+    span_s = after.time_s - before.time_s
+    u = (time_s - before.time_s) / span_s
+    start, end = before.positions_rad[joint], after.positions_rad[joint]
+    if before.velocities_rad_s is None or after.velocities_rad_s is None:
+        return start + u * (end - start)
+    start_slope, end_slope = before.velocities_rad_s[joint] * span_s, after.velocities_rad_s[joint] * span_s
+    return (
+        (1 + 2 * u) * (1 - u) ** 2 * start
+        + u * (1 - u) ** 2 * start_slope
+        + u**2 * (3 - 2 * u) * end
+        + u**2 * (u - 1) * end_slope
+    )
+
+
+def _check(joints: Sequence[str], points: Sequence[TrajectoryPoint], known: tuple[str, ...]) -> None:
+    if not joints or len(set(joints)) != len(joints):
+        raise MalformedCommandError(f"joint_names is {list(joints)!r}: allowed is each driven joint once")
+    for name in joints:
+        if name not in known:
+            raise UnknownJointError(f"joint is {name[:60]!r}: allowed is one of {', '.join(known)}")
+    if not points:
+        raise MalformedCommandError("the trajectory has no points: allowed is one or more")
+    last_s = -math.inf
+    for i, point in enumerate(points):
+        if not (math.isfinite(point.time_s) and point.time_s >= 0 and point.time_s > last_s):
+            raise MalformedCommandError(f"time_from_start of point {i} is {point.time_s} s: allowed is a rising time")
+        last_s = point.time_s
+        for what, values in (("positions", point.positions_rad), ("velocities", point.velocities_rad_s)):
+            if values is None:
+                continue
+            if len(values) != len(joints):
+                raise MalformedCommandError(f"point {i} has {len(values)} {what}: allowed is {len(joints)}")
+            if not all(math.isfinite(value) for value in values):
+                raise MalformedCommandError(f"{what} of point {i} are {list(values)}: allowed are finite numbers")
