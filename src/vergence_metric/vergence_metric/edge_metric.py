@@ -24,6 +24,16 @@ Figures = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class AlignedPair:
+    """Grey images (h, w) uint8 of one size, `alignment` taken out of the right one, and the seconds each stage took."""
+
+    left_grey: Grey
+    right_grey: Grey
+    alignment: Alignment
+    stage_s: dict[str, float]
+
+
+@dataclass(frozen=True)
 class EdgeMetricResult:
     """Everything measured on one pair; element i of each array belongs to `windows[i]`.
 
@@ -70,14 +80,24 @@ class EdgeMetric:
 
         Raises ImageShapeError where the images are not, or differ in size.
         """
+        return self.measure_aligned(self.align(left, right))
+
+    def align(self, left: NDArray[Any], right: NDArray[Any]) -> AlignedPair:
+        """Return a pair as it will be compared; raises ImageShapeError as `measure` does."""
         if left.shape[:2] != right.shape[:2]:
             raise ImageShapeError(f"left image is {left.shape[:2]}, right is {right.shape[:2]}: they must be alike")
-        p, stage_s = self.parameters, dict[str, float]()
+        stage_s = dict[str, float]()
         with _timed(stage_s, "grey"):
             left_grey, right_grey = to_grey(left), to_grey(right)
-        with _timed(stage_s, "alignment"):
+        with _timed(stage_s, "align"):
             alignment = self._aligner.update(left_grey, right_grey)
             right_grey = alignment.apply(right_grey)
+        return AlignedPair(left_grey, right_grey, alignment, stage_s)
+
+    def measure_aligned(self, pair: AlignedPair) -> EdgeMetricResult:
+        """Measure a pair that `align` has made ready."""
+        p, stage_s = self.parameters, dict(pair.stage_s)
+        left_grey, right_grey = pair.left_grey, pair.right_grey
         with _timed(stage_s, "edges"):
             left_edges, right_edges = detect_edges(left_grey, p), detect_edges(right_grey, p)
         windows = centre_windows(p.windows_px, *left_grey.shape)
@@ -100,7 +120,7 @@ class EdgeMetric:
         rank = np.argsort(np.argsort([window.size_px for window in windows]))  # oriented figures are sorted by size
         return EdgeMetricResult(
             windows,
-            alignment,
+            pair.alignment,
             left_grey,
             right_grey,
             left_edges,
