@@ -22,6 +22,17 @@ EXECUTABLES: dict[str, Executable] = {
     "gaze_controller_node": Executable(
         "vergence_servo", (("", "vergence_servo.gaze_controller_node:GazeNodeParameters"),)
     ),
+    "servo_node": Executable(
+        "vergence_servo",
+        (
+            ("", "vergence_servo.servo_parameters:ServoNodeParameters"),
+            ("fake.", "vergence_servo.drivers.fake:FakeParameters"),
+            ("kernel_pwm.", "vergence_servo.drivers.kernel_pwm:KernelPwmParameters"),
+            ("pca9685.", "vergence_servo.drivers.pca9685:Pca9685Parameters"),
+            ("pigpio.", "vergence_servo.drivers.pigpio:PigpioParameters"),
+            ("lgpio.", "vergence_servo.drivers.lgpio:LgpioParameters"),
+        ),
+    ),
     "sim_node": Executable("vergence_sim", (("", "vergence_sim.parameters:SimParameters"),)),
 }
 

@@ -144,7 +144,7 @@ class ServoHead:
         self._release_all(now_s, Mode.DISABLED if self.mode is Mode.DISABLED else Mode.RELEASED)
 
     def park(self, now_s: float, only_pulsing: bool = False) -> None:
-        """Go slowly to the parking pose and hold there; `only_pulsing` leaves limp servos limp. Raises DisabledError."""
+        """Go slowly to the parking pose and hold there; `only_pulsing` leaves limp servos so. Raises DisabledError."""
         self._check_enabled()
         self._trajectory = None
         self._wanted_rad = {
