@@ -4,13 +4,15 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
+
+from vergence_camera.fake_machine import FakeMachine
 
 Pixels = npt.NDArray[np.uint8]
 
@@ -49,80 +51,6 @@ def mjpeg_avi(tmp_path: Path) -> Path:
         writer.write(textured(number, 320, 240))
     writer.release()
     return path
-
-
-@dataclass
-class FakeMachine:
-    """A sysfs and /dev of its own, with webcams in it."""
-
-    root: Path
-    devices: list[Path] = field(default_factory=list)
-
-    @property
-    def sys(self) -> Path:
-        return self.root / "sys"
-
-    @property
-    def dev(self) -> Path:
-        return self.root / "dev"
-
-    def plug_in(
-        self,
-        number: int,
-        *,
-        name: str = "HD Webcam C525",
-        serial: str = "",
-        port: str = "1-1",
-        controller: str = "0000:00:14.0",
-        vendor: str = "046d",
-        product: str = "0826",
-        speed: str = "480",
-        metadata_too: bool = True,
-    ) -> Path:
-        bus = port.partition("-")[0]
-        usb = self.sys / "devices" / "pci0000:00" / controller / f"usb{bus}" / port
-        interface = usb / f"{port}:1.0"
-        for directory, file, text in (
-            (usb, "idVendor", vendor),
-            (usb, "idProduct", product),
-            (usb, "speed", speed),
-            *([(usb, "serial", serial)] if serial else []),
-        ):
-            directory.mkdir(parents=True, exist_ok=True)
-            (directory / file).write_text(text + "\n")
-        for index, offset in enumerate((0, 1) if metadata_too else (0,)):
-            node = f"video{number + offset}"
-            video = interface / "video4linux" / node
-            video.mkdir(parents=True)
-            (video / "name").write_text(f"{name}: {name}\n")
-            (video / "index").write_text(f"{index}\n")
-            (video / "device").symlink_to(interface, target_is_directory=True)
-            entry = self.sys / "class" / "video4linux" / node
-            entry.parent.mkdir(parents=True, exist_ok=True)
-            entry.symlink_to(video, target_is_directory=True)
-            self.dev.mkdir(parents=True, exist_ok=True)
-            (self.dev / node).touch()
-            words = f"{vendor}_{name.replace(' ', '_')}" + (f"_{serial}" if serial else "")
-            for kind, link in (
-                ("by-id", f"usb-{words}-video-index{index}"),
-                ("by-path", f"pci-{controller}-usb-0:{port.partition('-')[2]}:1.0-video-index{index}"),
-            ):
-                place = self.dev / "v4l" / kind / link
-                place.parent.mkdir(parents=True, exist_ok=True)
-                # Twins without serials fight for one by-id name: the later one wins, as with udev.
-                place.unlink(missing_ok=True)
-                place.symlink_to(Path("..") / ".." / node)
-        return self.dev / f"video{number}"
-
-    def unplug(self, number: int) -> None:
-        for node in (f"video{number}", f"video{number + 1}"):
-            entry = self.sys / "class" / "video4linux" / node
-            if entry.is_symlink():
-                entry.unlink()
-            (self.dev / node).unlink(missing_ok=True)
-            for link in (self.dev / "v4l").glob("by-*/*"):
-                if link.is_symlink() and link.readlink().name == node:
-                    link.unlink()
 
 
 @pytest.fixture

@@ -1,25 +1,21 @@
 """Enumeration over a machine's tree, choosing by any name, and staying with the camera that was chosen."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from vergence_camera.devices import Device, PinnedChoice, SystemTree, choose, find_devices, list_devices
 from vergence_camera.errors import AmbiguousCameraError, CameraNotFoundError, ChoiceError
+from vergence_camera.fake_machine import FakeMachine
 from vergence_camera.list_cameras import table
-from vergence_camera.v4l2.fake_kernel import FakeCamera, FakeKernel
-
-
-def tree_of(machine: Any) -> SystemTree:
-    return SystemTree(machine.sys, machine.dev)
+from vergence_camera.v4l2.fake_kernel import FakeKernel
 
 
 @pytest.fixture
-def pair(machine: Any) -> SystemTree:
+def pair(machine: FakeMachine) -> SystemTree:
     machine.plug_in(0, serial="AAA111", port="1-1.2", controller="0000:00:14.0")
     machine.plug_in(2, serial="BBB222", port="3-4", controller="0000:05:00.3", name="Other Cam", product="0999")
-    return tree_of(machine)
+    return machine.tree
 
 
 def test_finds_the_cameras_and_not_their_metadata_devices(pair: SystemTree) -> None:
@@ -61,10 +57,10 @@ def test_a_rule_without_a_value_is_refused(pair: SystemTree) -> None:
         choose("serial:", find_devices(pair))
 
 
-def test_twins_are_ambiguous_by_name_and_serial_but_not_by_path(machine: Any) -> None:
+def test_twins_are_ambiguous_by_name_and_serial_but_not_by_path(machine: FakeMachine) -> None:
     machine.plug_in(0, serial="SN0001", port="1-1")
     machine.plug_in(2, serial="SN0001", port="1-2")
-    devices = find_devices(tree_of(machine))
+    devices = find_devices(machine.tree)
     for text in ("SN0001", "serial:SN0001", devices[0].name):
         with pytest.raises(AmbiguousCameraError, match=r"by-path.*video0.*video2"):
             choose(text, devices)
@@ -72,14 +68,9 @@ def test_twins_are_ambiguous_by_name_and_serial_but_not_by_path(machine: Any) ->
     assert choose("port:1-1", devices) is devices[0]
 
 
-def replug(machine: Any, old: int, new: int, **details: str) -> None:
-    machine.unplug(old)
-    machine.plug_in(new, **details)
-
-
-def test_a_serial_is_followed_to_another_number_and_port(machine: Any) -> None:
+def test_a_serial_is_followed_to_another_number_and_port(machine: FakeMachine) -> None:
     machine.plug_in(0, serial="AAA111", port="1-1")
-    pinned = PinnedChoice("0", tree_of(machine))
+    pinned = PinnedChoice("0", machine.tree)
     assert pinned.resolve().endswith("video0")
     machine.unplug(0)
     with pytest.raises(CameraNotFoundError, match="is gone"):
@@ -92,10 +83,10 @@ def test_a_serial_is_followed_to_another_number_and_port(machine: Any) -> None:
 
 
 @pytest.mark.parametrize("serial", ["", "SN0001"])
-def test_twins_are_known_again_by_their_port(machine: Any, serial: str) -> None:
+def test_twins_are_known_again_by_their_port(machine: FakeMachine, serial: str) -> None:
     machine.plug_in(0, serial=serial, port="1-1")
     machine.plug_in(2, serial=serial, port="1-2")
-    tree = tree_of(machine)
+    tree = machine.tree
     left, right = PinnedChoice("port:1-1", tree), PinnedChoice("port:1-2", tree)
     assert left.resolve().endswith("video0")
     assert right.resolve().endswith("video2")
@@ -117,31 +108,28 @@ def test_a_device_node_without_sysfs_is_taken_by_its_path(tmp_path: Path) -> Non
         pinned.resolve()  # only what lies in /dev is trusted to be a device
 
 
-def test_listing_shows_names_paths_controller_formats_and_trouble(pair: SystemTree) -> None:
-    kernel = FakeKernel({str(pair.dev / "video0"): FakeCamera(), str(pair.dev / "video2"): FakeCamera()})
-    kernel.cameras[str(pair.dev / "video2")].open_errno = 13
-    text = table(list_devices(kernel, pair))
+def test_listing_shows_names_paths_controller_formats_and_trouble(pair: SystemTree, machine: FakeMachine) -> None:
+    machine.kernel.cameras[str(pair.dev / "video2")].open_errno = 13
+    text = table(list_devices(machine.kernel, pair))
     for part in (
         *("HD Webcam C525", "AAA111", "by-id", "by-path", "0000:00:14.0", "480 Mbit/s", "port 1-1.2"),
         *("MJPG     640x480@30/15, 1280x720@30", "YUYV     640x480@30, 1280x720@10", "Permission denied"),
     ):
         assert part in text
     assert "share" not in text
-    assert kernel.open_descriptors == []
+    assert machine.kernel.open_descriptors == []
 
 
-def test_listing_notes_a_shared_controller(machine: Any) -> None:
+def test_listing_notes_a_shared_controller(machine: FakeMachine) -> None:
     for number, port in ((0, "1-1"), (2, "1-2")):
         machine.plug_in(number, port=port)
-    listed = list_devices(FakeKernel({}), tree_of(machine))
+    listed = list_devices(machine.kernel, machine.tree)
     assert "several cameras share USB controller 0000:00:14.0" in table(listed)
 
 
-def test_listing_leaves_out_what_gives_no_pictures(pair: SystemTree) -> None:
-    codec = FakeCamera()
-    codec.capabilities = 0x0400_8000
-    kernel = FakeKernel({str(pair.dev / "video0"): codec, str(pair.dev / "video2"): FakeCamera()})
-    assert [entry.device.number for entry in list_devices(kernel, pair)] == [2]
+def test_listing_leaves_out_what_gives_no_pictures(pair: SystemTree, machine: FakeMachine) -> None:
+    machine.kernel.cameras[str(pair.dev / "video0")].capabilities = 0x0400_8000
+    assert [entry.device.number for entry in list_devices(machine.kernel, pair)] == [2]
 
 
 def test_names_are_empty_where_the_bus_has_none() -> None:

@@ -2,12 +2,13 @@
 
 import errno
 from collections.abc import Callable, Iterator
-from typing import Any
+from pathlib import Path
 
 import pytest
 
 from vergence_camera.devices import SystemTree
 from vergence_camera.doctor import Finding, check
+from vergence_camera.fake_machine import FakeMachine
 from vergence_camera.v4l2 import structures as v4l2
 from vergence_camera.v4l2.fake_kernel import FakeCamera, FakeKernel
 
@@ -15,31 +16,28 @@ from vergence_camera.v4l2.fake_kernel import FakeCamera, FakeKernel
 class Pair:
     """Two webcams on controllers of their own, playing at their rates."""
 
-    def __init__(self, machine: Any, make_jpeg: Callable[..., bytes], same_controller: bool = False) -> None:
-        first = machine.plug_in(0, serial="AAA", port="1-1")
-        second = machine.plug_in(2, serial="BBB", port="3-1", controller=self.second(same_controller))
-        self.tree = SystemTree(machine.sys, machine.dev)
-        self.cameras = [FakeCamera(), FakeCamera()]
-        self.kernel = FakeKernel({str(first): self.cameras[0], str(second): self.cameras[1]})
+    def __init__(self, machine: FakeMachine, make_jpeg: Callable[..., bytes], second: str = "0000:05:00.3") -> None:
+        self.machine = machine
+        self.cameras = [
+            machine.plug_in(0, serial="AAA", port="1-1"),
+            machine.plug_in(2, serial="BBB", port="3-1", controller=second),
+        ]
         self.picture = make_jpeg(0)
         self.stops: list[Callable[[], None]] = []
-
-    @staticmethod
-    def second(same: bool) -> str:
-        return "0000:00:14.0" if same else "0000:05:00.3"
 
     def play(self, *rates_hz: float) -> None:
         for camera, rate_hz in zip(self.cameras, rates_hz, strict=True):
             self.stops.append(camera.play(lambda number: self.picture, rate_hz))
 
     def findings(self, trial_s: float = 0.5) -> dict[str, Finding]:
-        found = check(kernel=self.kernel, tree=self.tree, trial_s=trial_s, max_skew_s=0.05)
-        assert self.kernel.open_descriptors == []
+        machine = self.machine
+        found = check(kernel=machine.kernel, tree=machine.tree, trial_s=trial_s, max_skew_s=0.05)
+        assert machine.kernel.open_descriptors == []
         return {finding.name.split()[0] + finding.name[-1]: finding for finding in found}
 
 
 @pytest.fixture
-def pair(machine: Any, make_jpeg: Callable[..., bytes]) -> Iterator[Pair]:
+def pair(machine: FakeMachine, make_jpeg: Callable[..., bytes]) -> Iterator[Pair]:
     made = Pair(machine, make_jpeg)
     yield made
     for stop in made.stops:
@@ -66,8 +64,8 @@ def test_different_rates_and_exposures(pair: Pair) -> None:
     assert "hold" in findings["pair2"].mend
 
 
-def test_a_shared_controller(machine: Any, make_jpeg: Callable[..., bytes]) -> None:
-    pair = Pair(machine, make_jpeg, same_controller=True)
+def test_a_shared_controller(machine: FakeMachine, make_jpeg: Callable[..., bytes]) -> None:
+    pair = Pair(machine, make_jpeg, second="0000:00:14.0")
     pair.play(30.0, 30.0)
     finding = pair.findings()["pair2"]
     assert not finding.ok
@@ -97,10 +95,9 @@ def test_silence(pair: Pair) -> None:
     assert "0 frames came" in finding.message
 
 
-def test_permission_and_old_usb(machine: Any) -> None:
-    path = machine.plug_in(0, serial="AAA", speed="12")
-    camera = FakeCamera(sizes={"YUYV": {(640, 480): (30,)}})
-    kernel, tree = FakeKernel({str(path): camera}), SystemTree(machine.sys, machine.dev)
+def test_permission_and_old_usb(machine: FakeMachine) -> None:
+    camera = machine.plug_in(0, FakeCamera(sizes={"YUYV": {(640, 480): (30,)}}), serial="AAA", speed="12")
+    kernel, tree = machine.kernel, machine.tree
     messages = " ".join(f.message for f in check(kernel=kernel, tree=tree, trial_s=0.0) if not f.ok)
     assert "no MJPG" in messages
     assert "12 Mbit/s" in messages
@@ -109,6 +106,6 @@ def test_permission_and_old_usb(machine: Any) -> None:
     assert "usermod" in refused.message
 
 
-def test_no_camera(tmp_path: Any) -> None:
+def test_no_camera(tmp_path: Path) -> None:
     (finding,) = check(kernel=FakeKernel({}), tree=SystemTree(tmp_path, tmp_path))
     assert not finding.ok
