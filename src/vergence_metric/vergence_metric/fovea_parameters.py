@@ -120,3 +120,6 @@ class TrackerParameters(Parameters):
     track_give_up_s: float = parameter(
         3.0, "a target hidden this long is no more searched for", unit="s", minimum=0.1, maximum=60.0
     )
+    track_relock_s: float = parameter(
+        0.5, "rest of the eyes after a loss until whatever lies at the fovea is taken", unit="s", minimum=0, maximum=60
+    )

@@ -34,9 +34,10 @@ class PredictiveLaw:
         if view.phase is Phase.SACCADE:
             travel = np.abs(target - view.shaft_rad) / view.speed_rad_s
             target = view.target.at(view.now_s + ahead_s + float(travel[view.driven].max(initial=0.0))).joints_rad
+        target = view.goal(target)
         target[~view.driven] = np.nan
         return self._inverse.command(target, view.shaft_rad, view.commanded_rad)
 
     def residual(self, view: LawView) -> Array:
         """Return how far each driven joint (3,) is from the target now."""
-        return np.where(view.driven, view.target.at(view.now_s).joints_rad - view.shaft_rad, 0.0)
+        return np.where(view.driven, view.goal(view.target.at(view.now_s).joints_rad) - view.shaft_rad, 0.0)

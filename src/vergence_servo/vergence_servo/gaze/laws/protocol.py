@@ -46,6 +46,19 @@ class LawView:
     lead_s: float
     minimum_vergence_rad: float
 
+    def goal(self, target_rad: Array) -> Array:
+        """Return where the joints (3,) have to go for a target at the joint angles `target_rad` (3,).
+
+        A held eye looks past the target by what it is off; the free eye has to look past it by the same, or the two
+        images would not agree: vergence is of the eyes with each other.
+        """
+        goal = target_rad.copy()
+        left, right = bool(self.driven[0]), bool(self.driven[1])
+        if left != right:
+            held = 1 if left else 0
+            goal[:2] += self.shaft_rad[held] - target_rad[held]
+        return goal
+
 
 class Law(Protocol):
     """One way to turn the eyes. Limits are not its business: what it wants is held to them afterwards."""
