@@ -2,6 +2,7 @@
 
 import signal
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -19,23 +20,28 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
     is made (a wrong parameter, rig or calibration) is one line on standard error and status 2; so is a parameter file
     that cannot be read. A clean end is status 0.
     """
-    node: Node | None = None
+    stop_asked = threading.Event()
+    # Under rclpy's own handlers, which shut the context down, Python's would also raise KeyboardInterrupt in the middle
+    # of whatever runs, a message's conversion or a servo's release.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop_asked.set())
     try:
         rclpy.init(args=list(args) if args is not None else None)
-    except KeyboardInterrupt:
-        return 0
     except Exception as error:
         return _bad_input(error)
+    node: Node | None = None
     try:
+        if stop_asked.is_set():
+            return 0
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
     except Exception as error:
-        if not rclpy.ok():
-            return 0  # a signal shut the context down under us; what failed then only noticed it
+        if stop_asked.is_set() or not rclpy.ok():
+            return 0  # the context was shut down under us; what failed then only noticed it
         if node is None and isinstance(error, (ValueError, OSError)):
             return _bad_input(error)
         raise

@@ -97,6 +97,8 @@ class EdgeMetricNode(Node):
         self._track_publisher.publish(track_message(track, edge, angular, pair.left.header, pair.skew_ns * 1e-9))
 
     def _on_failure(self, error: Exception) -> None:
+        if not self.context.ok():
+            return  # shut down while a pair was being measured
         self._failure = f"{type(error).__name__}: {error}"
         text = "".join(traceback.format_exception(error))
         self.get_logger().error(f"a pair could not be measured:\n{text}", throttle_duration_sec=10.0)
