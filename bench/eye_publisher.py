@@ -20,6 +20,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from vergence_common.images import array_to_image
+from vergence_common.memory import keep_large_blocks
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds
 
@@ -57,6 +58,7 @@ def publish_on_time(publisher: Publisher, messages: list[Image], timetable: dict
 def main() -> None:
     """Run; see the module's text."""
     topic, shift_px = sys.argv[1], int(sys.argv[2])
+    keep_large_blocks()  # as every node of ours does
     rclpy.init()
     node = Node("eye_publisher")
     publisher = node.create_publisher(Image, topic, IMAGE_QOS)

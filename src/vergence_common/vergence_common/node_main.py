@@ -10,6 +10,8 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
+from vergence_common.memory import keep_large_blocks
+
 STATUS_BAD_INPUT = 2
 
 
