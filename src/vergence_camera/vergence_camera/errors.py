@@ -89,3 +89,5 @@ class ReplayEndedError(CameraError):
 
 class ControlError(CameraError, ValueError):
     """A control that cannot take that value; the message says what is allowed."""
+
+    permanent = True
