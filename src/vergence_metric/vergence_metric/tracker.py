@@ -13,10 +13,11 @@ from enum import IntEnum
 
 import numpy as np
 
-from vergence_metric.appearance import Appearance, Sighting
+from vergence_metric.appearance import Appearance, Sighting, distance
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
-from vergence_metric.eye_watch import EyeView, EyeWatch, Pixel
+from vergence_metric.eye_watch import EyeState, EyeView, EyeWatch, Pixel
 from vergence_metric.fovea_parameters import TrackerParameters
+from vergence_metric.image_motion import image_motion_px
 from vergence_metric.zero_disparity import ZeroDisparity, zero_disparity
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
@@ -24,6 +25,8 @@ from vergence_rig.geometry import EyeAngles
 _NOWHERE: Pixel = (math.nan, math.nan)
 _MOTION_MEMORY = 0.6  # share of the old angular velocity kept at each frame
 _COAST_HALF_LIFE_S = 0.7  # a hidden target's predicted velocity fades: it may have stopped
+_USUAL_EXTENT_PX = (60.0, 60.0)
+_UNMISTAKABLE_LIKENESS = 0.8
 _DISTRUST_WITHOUT_DISPARITY = 0.6
 _USUAL_DEPTH_M = 0.06
 
@@ -83,15 +86,16 @@ class TargetTracker:
         self._watch = EyeWatch(self._parameters)
         self._target: _Target | None = None
         self._wants_lock = True
-        self._stamp_s = -math.inf
-        self._still_patch: Image | None = None
+        self._stamp_s = self._lost_s = -math.inf
+        self._former: _Target | None = None
+        self._before: Image | None = None
 
     def lock_here(self) -> None:
         """Lock anew on what lies at the fovea as soon as the eyes rest, as after a saccade."""
         self._target, self._wants_lock = None, True
 
     def update(self, left: Image, right: Image, stamp_s: float, eyes: EyeAngles) -> Track:
-        """Take a pair and say where the target is.
+        """Take a pair and say where the target is. The left image is kept until the next call: do not write into it.
 
         Args:
             left: (h, w) grey image of the left eye.
@@ -107,56 +111,71 @@ class TargetTracker:
             EyeView(self._cameras[0], eyes.pan_left_rad, eyes.tilt_rad),
             EyeView(self._cameras[1], eyes.pan_right_rad, eyes.tilt_rad),
         )
-        still = self._is_still(left)
-        self._stamp_s = stamp_s
+        before, self._before, self._stamp_s = self._before, left, stamp_s
         if state.saccading:
-            self._target, self._wants_lock = None, True
+            self._former, self._target, self._wants_lock = self._target or self._former, None, True
             return self._without(TrackStatus.LOCKING, "the left eye is in a saccade")
         if self._target is not None:
             return self._follow(self._target, left, right, stamp_s, views)
         if not self._wants_lock:
-            return self._without(TrackStatus.LOST, "the target was hidden too long; waiting for a saccade")
-        p = self._parameters
-        if state.rested_s < p.track_settle_s or (not still and state.rested_s < p.track_still_wait_s):
+            # A new target may have taken its place, and eyes that are held make no saccade to say so.
+            self._wants_lock = min(state.rested_s, stamp_s - self._lost_s) >= self._parameters.track_relock_s
+            return self._without(TrackStatus.LOST, "the target was hidden too long; locking anew once the eyes rest")
+        if not self._at_rest(state, before, left):
             return self._without(TrackStatus.LOCKING, "the eyes came to rest just now")
         return self._lock(left, right, stamp_s, views)
+
+    def _at_rest(self, state: EyeState, before: Image | None, left: Image) -> bool:
+        """Tell whether the left eye rests: its joints, and its image unless that has moved for too long already."""
+        p = self._parameters
+        if state.rested_s < p.track_settle_s or before is None or before.shape != left.shape:
+            return False
+        return state.rested_s >= p.track_still_wait_s or image_motion_px(before, left) <= p.track_still_px
 
     def _without(self, status: TrackStatus, reason: str) -> Track:
         nan = math.nan
         return Track(self._track_id, nan, _NOWHERE, _NOWHERE, nan, nan, nan, (nan, nan), 0.0, status, reason)
 
-    def _is_still(self, left: Image) -> bool:
-        """Tell whether the fovea's image has stayed where it was since the last frame."""
-        h, w = left.shape
-        half = min(40, h // 4, w // 4)
-        patch = left[h // 2 - half : h // 2 + half, w // 2 - half : w // 2 + half]
-        before, self._still_patch = self._still_patch, patch.copy()
-        if before is None or before.shape != patch.shape:
-            return False
-        look = Appearance(before, ((half * 2 - 1) / 2, (half * 2 - 1) / 2), (half, half))
-        seen = look.search(patch, look.pixel, 8)
-        moved = math.hypot(seen.pixel[0] - look.pixel[0], seen.pixel[1] - look.pixel[1])
-        return moved <= self._parameters.track_still_px
-
     def _lock(self, left: Image, right: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Track:
-        """Lock on what lies at the fovea."""
+        """Lock on what lies at the fovea; a target the eyes turned to by a saccade may have moved on a little."""
         h, w = left.shape
-        fovea = ((w - 1) / 2, (h - 1) / 2)
-        disparity = self._estimator.estimate(left, right, fovea)
+        point = self._former_near(((w - 1) / 2, (h - 1) / 2), left, stamp_s, views)
+        disparity = self._estimator.estimate(left, right, point)
         if disparity.status is DisparityStatus.NO_TEXTURE:
             return self._without(TrackStatus.UNLOCKED, "nothing at the fovea to lock on")
-        point, extent = fovea, (60.0, 60.0)
-        if disparity.ok:
-            region = self._region(left, right, fovea, disparity, views)
-            if region.found and not region.touches_border:
-                point, extent = region.centroid_px, region.extent_px
-                if point != fovea:
-                    disparity = self._better(left, right, point, disparity)
+        point, extent, disparity = self._segment(left, right, point, disparity, views)
         self._track_id += 1
-        self._wants_lock = False
-        looks = Appearance(left, point, extent)
-        self._target = _Target(self._track_id, stamp_s, looks, stamp_s, views[0].direction(point), np.zeros(3))
+        self._wants_lock, self._former = False, None
+        looks = Appearance(left, point, extent or _USUAL_EXTENT_PX)
+        direction = views[0].direction(point)
+        self._target = _Target(self._track_id, stamp_s, looks, stamp_s, direction, np.zeros(3), extent is not None)
         return self._tell(self._target, Sighting(point, 1.0, 0), disparity, views)
+
+    def _former_near(self, fovea: Pixel, left: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Pixel:
+        """Return where the target of before the saccade is seen, if that is near the fovea, else the fovea."""
+        p, former = self._parameters, self._former
+        if former is None or stamp_s - former.seen_s > p.track_give_up_s:
+            return fovea
+        expected = views[0].pixel(former.predicted(stamp_s))
+        if not distance(expected, fovea) <= 2.0 * p.track_search_px:
+            return fovea
+        sighting = former.looks.search(left, expected, p.track_search_px)
+        near = distance(sighting.pixel, fovea) <= p.track_search_px
+        return sighting.pixel if near and sighting.likeness >= p.track_reacquire_likeness else fovea
+
+    def _segment(
+        self, left: Image, right: Image, point: Pixel, disparity: Disparity, views: tuple[EyeView, EyeView]
+    ) -> tuple[Pixel, tuple[float, float] | None, Disparity]:
+        """Return centre, extent and disparity of the thing at a point; the point and None where it has no bounds."""
+        if not disparity.ok:
+            return point, None, disparity
+        region = self._region(left, right, point, disparity, views)
+        if not region.found or region.touches_border:
+            return point, None, disparity
+        at_center = self._estimator.estimate(left, right, region.centroid_px, disparity.horizontal_px)
+        if _plausible(at_center, disparity.horizontal_px, self._parameters.track_disparity_jump_px):
+            disparity = at_center
+        return region.centroid_px, region.extent_px, disparity
 
     def _region(
         self, left: Image, right: Image, fovea: Pixel, disparity: Disparity, views: tuple[EyeView, EyeView]
@@ -172,10 +191,6 @@ class TargetTracker:
             p.track_snap_px,
         )
 
-    def _better(self, left: Image, right: Image, point: Pixel, disparity: Disparity) -> Disparity:
-        at_point = self._estimator.estimate(left, right, point, disparity.horizontal_px)
-        return at_point if _plausible(at_point, disparity.horizontal_px, 1e9) else disparity
-
     def _follow(
         self, target: "_Target", left: Image, right: Image, stamp_s: float, views: tuple[EyeView, EyeView]
     ) -> Track:
@@ -184,7 +199,7 @@ class TargetTracker:
         expected_px = views[0].pixel(target.predicted(stamp_s))
         hidden_s = stamp_s - target.seen_s if target.hidden else 0.0
         if hidden_s > p.track_give_up_s:
-            self._target = None
+            self._target, self._lost_s = None, stamp_s
             return self._without(TrackStatus.LOST, f"not seen for {hidden_s:.1f} s")
         if not _inside(expected_px, left):
             target.hidden = True
@@ -203,9 +218,18 @@ class TargetTracker:
         disparity = self._estimator.estimate(left, right, sighting.pixel, expected_d)
         if disparity.ok and expected_d is not None and target.disparity_age_s(stamp_s) < 0.5:
             jump = disparity.horizontal_px - expected_d
-            if abs(jump) > p.track_disparity_jump_px:
+            # Servos without feedback are not where they say while they turn: looks that have not changed count more.
+            if abs(jump) > p.track_disparity_jump_px and sighting.likeness < _UNMISTAKABLE_LIKENESS:
                 target.hidden = True
                 return self._lost(target, f"what is seen there has another disparity, by {jump:+.1f} px")
+        if disparity.ok and not target.bounded:
+            point, extent, disparity = self._segment(left, right, sighting.pixel, disparity, views)
+            if extent is not None:
+                # It was locked on before the right eye saw it; now its bounds are known.
+                sighting, target.bounded = replace(sighting, pixel=point), True
+                target.looks = Appearance(left, point, extent)
+                target.moved(stamp_s, views[0].direction(point))
+                return self._tell(target, sighting, disparity, views)
         target.looks.accept(left, sighting, renew=disparity.ok)
         target.moved(stamp_s, views[0].direction(sighting.pixel))
         return self._tell(target, sighting, disparity, views)
@@ -261,6 +285,7 @@ class _Target:
     seen_s: float
     direction: np.ndarray  # unit vector in rig_base when last seen
     velocity: np.ndarray  # of that vector, per second
+    bounded: bool  # its region was told from what is around
     hidden: bool = False
     right_seen_s: float = -math.inf
     absolute_rad: float = math.nan  # angle by which the right ray is turned against the left one, across

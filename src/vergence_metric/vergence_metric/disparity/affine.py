@@ -93,7 +93,7 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
     v = (np.arange(-radius, radius + 1) + (y + left.y0 - point_px[1]))[:, None]
     weights = (np.exp(-0.5 * (v / sigma) ** 2) * np.exp(-0.5 * (u / sigma) ** 2)).ravel()
     weights /= weights.sum()
-    centred = patch - float(weights @ patch.ravel())
+    centred = patch - float((weights * patch.ravel()).sum())
     # Offsets are scaled by the window, so that the columns of the design are of one size.
     columns_of_design = [gx, gx * (u / sigma), gx * (v / sigma), gy, gy * (u / sigma), gy * (v / sigma), centred]
     design = np.empty((8, patch.size))
@@ -101,7 +101,8 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
         row[:] = column.ravel()
     design[7] = 1.0
     weighted = design * weights
-    normal = weighted @ design.T
+    # einsum, not matmul: BLAS threads wait for one another whenever other nodes hold the cores.
+    normal = np.einsum("in,jn->ij", weighted, design)
     signal = float(normal[6, 6])
     if signal < 1e-3:
         return None
@@ -114,20 +115,18 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
         inverse = np.linalg.inv(normal + np.diag(damping * 4.0))
     except np.linalg.LinAlgError:
         return None
-    us, vs = np.broadcast_arrays(u, v)
-    offsets = np.stack([us.ravel(), vs.ravel(), np.ones(patch.size)])
-    origin = np.array([point_px[0] - right.x0, point_px[1] - right.y0])
+    origin = (point_px[0] - right.x0, point_px[1] - right.y0)
     homogeneous = np.vstack([warp, [0.0, 0.0, 1.0]])
     gain = 1.0
     for _ in range(_ITERATIONS):
-        places = homogeneous[:2] @ offsets + origin[:, None]
+        places = [(row[0] * u + row[1] * v + (row[2] + start)) for row, start in zip(homogeneous, origin, strict=False)]
         # remap of OpenCV 4 rounds to this grid, that of OpenCV 5 does not: round first, make good what that misses.
-        rounded = np.rint(places * _REMAP_STEPS) / _REMAP_STEPS
-        maps = rounded.astype(np.float32).reshape(2, *patch.shape)
-        seen = cv2.remap(right.grey, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        missed = gain * ((places[0] - rounded[0]) * design[0] + (places[1] - rounded[1]) * design[3])
-        seen = seen.ravel() + missed
-        solution = inverse @ (weighted @ seen)
+        rounded = [np.rint(place * _REMAP_STEPS) / _REMAP_STEPS for place in places]
+        maps = [place.astype(np.float32) for place in rounded]
+        sampled = cv2.remap(right.grey, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        missed = gain * ((places[0] - rounded[0]) * gx + (places[1] - rounded[1]) * gy)
+        seen = (sampled + missed).ravel()
+        solution = inverse @ np.einsum("in,n->i", weighted, seen)
         gain = float(solution[6])
         if gain < 0.2 or gain > 5.0:
             return None
@@ -144,11 +143,11 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
             return None
         if np.abs(step).max() < _CONVERGED_PX:
             break
-    residual = seen - solution @ design
-    variance = float(weights @ residual**2)
-    spread = inverse @ (weighted * weights @ design.T) @ inverse
+    residual = seen - np.einsum("i,in->n", solution, design)
+    variance = float((weights * residual**2).sum())
+    influence = weights * np.einsum("i,in->n", inverse[0], design)
     # The blur makes neighbouring residuals alike; the factor is measured (bench row sigma).
-    sigma_px = math.sqrt(max(variance * spread[0, 0], 0.0)) / gain * 2.0
+    sigma_px = math.sqrt(variance * float((influence**2).sum())) / gain * 2.0
     total = gain**2 * signal + variance
     return Fit(
         -float(homogeneous[0, 2]),

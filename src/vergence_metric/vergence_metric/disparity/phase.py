@@ -56,11 +56,12 @@ def _shift(cross: NDArray[np.complex128]) -> tuple[float, float, float] | None:
     design = -2 * np.pi * np.column_stack([fx[used], fy[used]])
     # A phase that is more than a quarter turn off carries no slope, only a wrong match at that frequency.
     weights = power[used] * (np.abs(angle) < np.pi / 2)
-    normal = (design * weights[:, None]).T @ design
+    normal = np.einsum("n,ni,nj->ij", weights, design, design)
     if np.linalg.det(normal) <= 1e-12 * normal[0, 0] * normal[1, 1]:
         return None
     inverse = np.linalg.inv(normal)
-    slope = inverse @ (design.T @ (weights * angle))
-    residual = angle - design @ slope
-    variance = float((inverse @ ((design * (weights * residual)[:, None] ** 2).T @ design) @ inverse)[0, 0])
+    slope = inverse @ np.einsum("n,ni->i", weights * angle, design)
+    residual = angle - design[:, 0] * slope[0] - design[:, 1] * slope[1]
+    influence = weights * residual * (design[:, 0] * inverse[0, 0] + design[:, 1] * inverse[0, 1])
+    variance = float((influence**2).sum())
     return whole_x + float(slope[0]), whole_y + float(slope[1]), math.sqrt(max(variance, 0.0))
