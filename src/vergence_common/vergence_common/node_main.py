@@ -22,6 +22,7 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
     is made (a wrong parameter, rig or calibration) is one line on standard error and status 2; so is a parameter file
     that cannot be read. A clean end is status 0.
     """
+    keep_large_blocks()
     stop_asked = threading.Event()
     # Under rclpy's own handlers, which shut the context down, Python's would also raise KeyboardInterrupt in the middle
     # of whatever runs, a message's conversion or a servo's release.
