@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vergence_metric.contrast import contrasts
+from vergence_metric.contrast import contrasts, foveal_contrast
 from vergence_metric.edge_parameters import EdgeMetricParameters
 from vergence_metric.edges import Edges, detect_edges
 from vergence_metric.oriented_edges import OrientedField, oriented_field
@@ -122,6 +122,31 @@ def test_edges_only_beyond_the_window_do_not_count() -> None:
     found = contrasts(field(edges_of(image), edges_of(image), (50, 120)), 5)
     assert np.isnan(found.both[0])
     assert found.both[1] == 0.0
+
+
+def verged_disc(radius: int) -> tuple[Edges, Edges]:
+    """Return edges of views whose middle, a disc, is verged and whose surroundings are 20 px off."""
+    near, far = picture(11), picture(12)
+    views = [far[:, 40:240].copy(), far[:, 60:260].copy()]
+    rows, columns = np.mgrid[:200, :200]
+    inside = np.hypot(rows - 99.5, columns - 99.5) < radius
+    for view in views:
+        view[inside] = near[:, 40:240][inside]
+    return edges_of(views[0]), edges_of(views[1])
+
+
+def test_the_foveal_form_sees_a_target_smaller_than_the_window() -> None:
+    small = field(*verged_disc(20), (50, 100))
+    assert foveal_contrast(small, 5, 8.0) < 0.35
+    assert contrasts(small, 5).both[1] > 0.6
+    assert foveal_contrast(small, 5, 1e6) == pytest.approx(contrasts(small, 5).both[1], abs=0.01)
+    unrelated = field(edges_of(picture(3)), edges_of(picture(4)), (50, 100))
+    assert foveal_contrast(unrelated, 5, 14.0) == pytest.approx(1.0, abs=0.25)
+
+
+def test_the_foveal_form_is_nan_without_edges() -> None:
+    blank = edges_of(np.full((100, 100), 90, np.uint8))
+    assert np.isnan(foveal_contrast(field(blank, edges_of(picture(1, 100, 100)), (50, 80)), 5, 14.0))
 
 
 @pytest.mark.parametrize(("bins", "truncation"), [(0, 5), (9, 5), (8, 0), (8, 16)])

@@ -1,12 +1,11 @@
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.verged import VergedJudge, judged_contrast
+from vergence_metric.verged import VergedJudge
 from vergence_rig.parameters import ParameterError
 
 P = EdgeMetricParameters(verged_contrast=0.6, verged_leave_contrast=0.72, verged_px=2.0, verged_leave_px=4.0)
@@ -51,20 +50,6 @@ def test_verged_never_shows_with_high_contrast_or_a_large_confident_error(
         if judging.update(contrast, error, confidence):
             assert contrast <= P.verged_leave_contrast
             assert confidence < P.verged_confidence or abs(error) <= P.verged_leave_px
-
-
-def test_windows_from_50_to_100_px_judge() -> None:
-    windows = np.array([25, 50, 100, 150, 300], np.uint32)
-    contrast = np.array([0.0, 0.2, 0.4, 9.0, 9.0])
-    assert judged_contrast(windows, contrast) == pytest.approx(0.3)
-    contrast[1] = math.nan
-    assert judged_contrast(windows, contrast) == pytest.approx(0.4)
-    contrast[2] = math.nan
-    assert math.isnan(judged_contrast(windows, contrast))
-
-
-def test_without_such_windows_the_smallest_judges() -> None:
-    assert judged_contrast(np.array([300, 120], np.uint32), np.array([0.9, 0.5])) == 0.5
 
 
 @pytest.mark.parametrize("name", ["verged_leave_contrast", "verged_leave_px"])

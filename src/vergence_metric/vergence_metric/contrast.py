@@ -9,6 +9,7 @@ The denominator is what the numerator would be at any unrelated alignment of the
 texture and exposure cancel. It judges, it does not guide: it is flat a few pixels away from vergence.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +50,27 @@ def contrasts(field: OrientedField, truncation_px: int) -> Contrasts:
         # chance is 0 only where every pixel is an edge pixel: nothing to tell apart
         ratios.append(np.where(judgeable & (chance > 0.0), total / np.where(chance > 0.0, chance, 1.0), np.nan))
     return Contrasts(*ratios)
+
+
+def foveal_contrast(field: OrientedField, truncation_px: int, sigma_px: float) -> float:
+    """Return the contrast of what the eyes are turned to: edge pixels weigh less with their distance from the centre.
+
+    A window with a soft border: a target that fills only the middle of the smallest window still decides. The weight is
+    a Gaussian; chance is that of the smallest window which holds two standard deviations of it. Mean of both
+    directions, NaN where there is nothing to judge.
+    """
+    wide_enough = [i for i, window in enumerate(field.windows) if window.size_px >= 4.0 * sigma_px]
+    window = wide_enough[0] if wide_enough else len(field.windows) - 1
+    ratios = []
+    for direction in (0, 1):
+        edges, weight = field.images[direction], field.fovea_weights(direction, sigma_px)
+        inside = edges.ring <= window
+        of_bin = np.bincount(edges.bin[inside], weights=weight[inside], minlength=field.bins)
+        everywhere = field.mean_distances_px(1 - direction, truncation_px, _LATTICE)[window]
+        figure = float(weight[inside] @ field.distances_px(direction, truncation_px)[inside])
+        chance = float(of_bin @ everywhere)
+        ratios.append(figure / chance if chance > 0.0 else math.nan)
+    return (ratios[0] + ratios[1]) / 2.0
 
 
 def _counts(field: OrientedField, image: int) -> NDArray[np.int64]:

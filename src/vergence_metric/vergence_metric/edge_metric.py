@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.alignment import Aligner, Alignment
 from vergence_metric.chance import chance_levels
-from vergence_metric.contrast import contrasts
+from vergence_metric.contrast import contrasts, foveal_contrast
 from vergence_metric.edge_distance import edge_distances
 from vergence_metric.edge_parameters import EdgeMetricParameters
 from vergence_metric.edges import Edges, Grey, ImageShapeError, detect_edges, to_grey
@@ -39,7 +39,7 @@ class EdgeMetricResult:
 
     `left_grey` and `right_grey` (h, w) uint8 are what was compared: `alignment` is already taken out of the right one.
     Arrays carry the names of vergence_msgs/EdgeVergence; figures are float64 and NaN where `status` (WindowStatus) says
-    why. `stage_s` holds the seconds that each stage took.
+    why. `foveal_contrast` is what VergedJudge takes. `stage_s` holds the seconds that each stage took.
     """
 
     windows: tuple[Window, ...]
@@ -57,6 +57,7 @@ class EdgeMetricResult:
     contrast_left_to_right: Figures
     contrast_right_to_left: Figures
     contrast: Figures
+    foveal_contrast: float
     robust_left_to_right_px: Figures
     robust_right_to_left_px: Figures
     status: NDArray[np.uint8]
@@ -116,6 +117,7 @@ class EdgeMetric:
                 truncation_px=max(p.contrast_truncation_px, p.robust_truncation_px),
             )
             contrast = contrasts(oriented, p.contrast_truncation_px)
+            foveal = foveal_contrast(oriented, p.contrast_truncation_px, p.verged_sigma_px)
             robust_left, robust_right = robust_distances(oriented, p.robust_truncation_px, p.fovea_sigma_px)
         rank = np.argsort(np.argsort([window.size_px for window in windows]))  # oriented figures are sorted by size
         return EdgeMetricResult(
@@ -134,6 +136,7 @@ class EdgeMetric:
             contrast.left_to_right[rank],
             contrast.right_to_left[rank],
             contrast.both[rank],
+            foveal,
             robust_left[rank],
             robust_right[rank],
             distances.status,

@@ -78,9 +78,14 @@ class EdgeMetricParameters(Parameters):
     align_every_pairs: int = parameter(
         15, "align auto: after the first few pairs, estimate on one pair in so many", minimum=1, maximum=100000
     )
-    verged_contrast: float = parameter(
-        0.6, "verged: at most this mean contrast of the windows from 50 to 100 px", minimum=0.0, maximum=2.0
+    verged_sigma_px: float = parameter(
+        14.0,
+        "verged: Gaussian weight of edge pixels around the image centre in the contrast that judges",
+        unit="px",
+        minimum=1.0,
+        maximum=1000.0,
     )
+    verged_contrast: float = parameter(0.6, "verged: at most this contrast of the fovea", minimum=0.0, maximum=2.0)
     verged_leave_contrast: float = parameter(0.72, "verged: above this contrast it ends", minimum=0.0, maximum=2.0)
     verged_px: float = parameter(2.0, "verged: at most this signed error", unit="px", minimum=0.0, maximum=1000.0)
     verged_leave_px: float = parameter(

@@ -72,6 +72,11 @@ class OrientedField:
             means[i] = truncation_px - steps @ counts[:, : self.bins] / (len(row) * len(column))
         return means
 
+    def fovea_weights(self, image: int, sigma_px: float) -> NDArray[np.float64]:
+        """Return a Gaussian weight of each edge pixel of `image` about the windows' centre, (n,)."""
+        edges, window = self.images[image], self.windows[-1]
+        return _gaussian(window.height, sigma_px)[edges.row] * _gaussian(window.width, sigma_px)[edges.column]
+
 
 _SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").view(np.uint64).ravel()
 
@@ -109,6 +114,10 @@ def _offsets(truncation_px: int) -> dict[int, tuple[tuple[int, int], ...]]:
     pairs = [(dx, dy) for dx in reach for dy in reach if dx * dx + dy * dy < truncation_px**2]
     squares = sorted({dx * dx + dy * dy for dx, dy in pairs})
     return {s: tuple((dx, dy) for dx, dy in pairs if dx * dx + dy * dy == s) for s in squares}
+
+
+def _gaussian(length: int, sigma: float) -> NDArray[np.float64]:
+    return np.exp(-0.5 * ((np.arange(length) - (length - 1) / 2.0) / sigma) ** 2)
 
 
 def _oriented(edges: Edges, windows: tuple[Window, ...], bins: int, signed: bool, truncation: int) -> OrientedEdges:

@@ -10,7 +10,7 @@ from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
 from vergence_metric.tracker import TargetTracker, Track, TrackStatus
-from vergence_metric.verged import VergedJudge, judged_contrast
+from vergence_metric.verged import VergedJudge
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import Rig
@@ -50,7 +50,7 @@ class PairMeasurement:
 
     def verged(self, edge: EdgeMetricResult, error_px: float, confidence: float) -> bool:
         """Tell whether the eyes are verged, by the contrast and the signed error of a pair, and by the last verdict."""
-        return self._judge.update(judged_contrast(edge.windows_px, edge.contrast), error_px, confidence)
+        return self._judge.update(edge.foveal_contrast, error_px, confidence)
 
     def track(self, edge: EdgeMetricResult, stamp_s: float, eyes: EyeAngles | None, models: Models | None) -> Track:
         """Return where the target is in a pair measured by `edge`.

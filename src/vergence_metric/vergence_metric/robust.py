@@ -23,8 +23,7 @@ def robust_distances(
     totals = []
     for direction in (0, 1):
         edges = field.images[direction]
-        weight = _weight(edges.row, field.windows[-1].height, fovea_sigma_px)
-        weight = weight * _weight(edges.column, field.windows[-1].width, fovea_sigma_px)
+        weight = field.fovea_weights(direction, fovea_sigma_px)
         distance = field.distances_px(direction, truncation_px)
         totals.append(
             (
@@ -38,9 +37,3 @@ def robust_distances(
         np.where(measurable, distance / np.where(measurable, weight, 1.0), np.nan) for distance, weight, _ in totals
     )
     return left_to_right, right_to_left
-
-
-def _weight(position: NDArray[np.int64], length: int, sigma: float) -> NDArray[np.float64]:
-    """Return the Gaussian weight of positions along one side of the largest window."""
-    profile = np.exp(-0.5 * ((np.arange(length) - (length - 1) / 2.0) / sigma) ** 2)
-    return profile[position]
