@@ -62,6 +62,7 @@ class Recorder:
         self.node.create_subscription(EdgeVergence, "vergence/edge", self._into(self.edges), STATE_QOS)
         self.node.create_subscription(TrueVergence, "ground_truth/vergence", self._into(self.truths), STATE_QOS)
         self.node.create_subscription(PointStamped, "gaze/fixation_point", self._into(self.fixations), STATE_QOS)
+        self._image_subscriptions: list[Any] = []
         self._look_at = ActionClient(self.node, LookAt, "gaze/look_at")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
@@ -124,16 +125,27 @@ class Recorder:
         """Return the next pair of images together with the metric that the graph computed from that very pair."""
         for images in self._images.values():
             images.clear()
-        subscriptions = [
-            self.node.create_subscription(Image, f"{eye}/image_raw", self._keep(eye), IMAGE_QOS) for eye in self._images
-        ]
+        self._in_executor(self._subscribe_to_images, alive)
         try:
             found = self.wait_for("a pair of images and its metric", self._matched, timeout_s, alive)
         finally:
-            for subscription in subscriptions:
-                self.node.destroy_subscription(subscription)
+            self._in_executor(self._unsubscribe_from_images, alive)
         left, right, edge = found
         return StereoPicture(image_to_array(left).copy(), image_to_array(right).copy(), edge)
+
+    def _in_executor(self, work: Callable[[], None], alive: Callable[[], None]) -> None:
+        # Entities must not come and go under the executor while it waits for them.
+        self._future("the recorder's own thread", self._executor.create_task(work), 5.0, alive)
+
+    def _subscribe_to_images(self) -> None:
+        self._image_subscriptions = [
+            self.node.create_subscription(Image, f"{eye}/image_raw", self._keep(eye), IMAGE_QOS) for eye in self._images
+        ]
+
+    def _unsubscribe_from_images(self) -> None:
+        for subscription in self._image_subscriptions:
+            self.node.destroy_subscription(subscription)
+        self._image_subscriptions = []
 
     def _matched(self) -> tuple[Image, Image, EdgeVergence] | None:
         for entry in reversed(self.edges[-_KEPT_IMAGES:]):

@@ -116,8 +116,11 @@ def _pixel(goal: Goal, rig: Rig, parameters: GazeParameters, history: JointHisto
         # A depth that somebody typed is good to a tenth or so.
         sigma = 0.1 * max(abs(eyes.vergence_rad), 0.04)
         return WantedTarget(stamp_s, angles, spread_of_eye(goal.left_eye, _CLICK_SIGMA_RAD, sigma))
-    # Without depth the eyes keep their present vergence, as far as it is one that leaves both directions open.
-    vergence = float(np.clip(joints[1] - joints[0], *_PRESENT_VERGENCE_BOUNDS_RAD))
+    # Without depth the eyes keep their present vergence: all of it where they already look, elsewhere as far as it
+    # leaves both directions open.
+    at_fovea = math.hypot(pan - eye_pan, tilt - joints[2]) <= parameters.saccade_threshold_rad
+    lowest, highest = _PRESENT_VERGENCE_BOUNDS_RAD
+    vergence = float(np.clip(joints[1] - joints[0], lowest, math.inf if at_fovea else highest))
     version = pan + 0.5 * vergence if goal.left_eye else pan - 0.5 * vergence
     spread = spread_of_eye(goal.left_eye, _CLICK_SIGMA_RAD, parameters.prior_vergence_sigma_rad)
     return WantedTarget(stamp_s, np.array([version, vergence, tilt]), spread)
