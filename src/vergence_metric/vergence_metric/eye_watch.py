@@ -1,4 +1,4 @@
-"""What the turning of the left eye does to tracking: when it is a saccade, when the eye rests, where pixels go."""
+"""What the turning of the eyes does to tracking: when it is a saccade, when they rest, where pixels go."""
 
 import math
 from collections import deque
@@ -15,43 +15,51 @@ Pixel = tuple[float, float]
 
 @dataclass(frozen=True)
 class EyeState:
-    """Whether the left eye is in a saccade, and for how long its joints have rested (0 while they turn)."""
+    """Whether an eye is in a saccade, and for how long the joints have rested (0 while they turn)."""
 
     saccading: bool
     rested_s: float
 
 
 class EyeWatch:
-    """Tells saccades and rest from the joint angles of successive frames (of the left eye: its pan and the tilt)."""
+    """Tells saccades and rest from the joint angles of successive frames.
+
+    Either eye's jump counts: one of the right eye alone is a jump in depth, to something else on the same ray.
+    """
 
     def __init__(self, parameters: TrackerParameters) -> None:
         self._parameters = parameters
-        self._history: deque[tuple[float, float, float]] = deque()
+        self._history: deque[tuple[float, EyeAngles]] = deque()
         self._rest_since_s = math.nan
 
     def update(self, stamp_s: float, eyes: EyeAngles) -> EyeState:
         """Take the angles at a frame's stamp; stamps must increase."""
         p = self._parameters
-        now = (stamp_s, eyes.pan_left_rad, eyes.tilt_rad)
-        saccading = any(
-            math.degrees(max(abs(now[1] - pan), abs(now[2] - tilt))) > p.track_saccade_deg
-            for _, pan, tilt in self._history
-        )
+        saccading = any(_turned_deg(before, eyes) > p.track_saccade_deg for _, before in self._history)
         if self._history:
-            before = self._history[-1]
-            turned = math.degrees(max(abs(now[1] - before[1]), abs(now[2] - before[2])))
-            if turned > p.track_rest_deg_s * (stamp_s - before[0]):
+            before_s, before = self._history[-1]
+            if _turned_deg(before, eyes) > p.track_rest_deg_s * (stamp_s - before_s):
                 self._rest_since_s = math.nan
             elif math.isnan(self._rest_since_s):
-                self._rest_since_s = before[0]
+                self._rest_since_s = before_s
         else:
             self._rest_since_s = stamp_s
-        self._history.append(now)
+        self._history.append((stamp_s, eyes))
         # A little slack, so that frames 33 ms apart are still compared over the whole of 100 ms.
         while self._history and self._history[0][0] < stamp_s - p.track_saccade_s - 1e-3:
             self._history.popleft()
         rested = 0.0 if math.isnan(self._rest_since_s) else stamp_s - self._rest_since_s
         return EyeState(saccading, rested)
+
+
+def _turned_deg(before: EyeAngles, now: EyeAngles) -> float:
+    return math.degrees(
+        max(
+            abs(now.pan_left_rad - before.pan_left_rad),
+            abs(now.pan_right_rad - before.pan_right_rad),
+            abs(now.tilt_rad - before.tilt_rad),
+        )
+    )
 
 
 @dataclass(frozen=True)
