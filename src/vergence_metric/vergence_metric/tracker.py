@@ -8,6 +8,7 @@ about the direction it is predicted in until it shows again.
 """
 
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -27,6 +28,7 @@ _MOTION_MEMORY = 0.6  # share of the old angular velocity kept at each frame
 _COAST_HALF_LIFE_S = 0.7  # a hidden target's predicted velocity fades: it may have stopped
 _USUAL_EXTENT_PX = (60.0, 60.0)
 _UNMISTAKABLE_LIKENESS = 0.8
+_KEPT_SHARE = 0.9  # of a saccade: nearer to the fovea than this the target was not left
 _DISTRUST_WITHOUT_DISPARITY = 0.6
 _USUAL_DEPTH_M = 0.06
 
@@ -87,8 +89,9 @@ class TargetTracker:
         self._target: _Target | None = None
         self._wants_lock = True
         self._stamp_s = self._lost_s = -math.inf
-        self._former: _Target | None = None
         self._before: Image | None = None
+        # How far from the fovea the target was seen of late, until the saccade in progress began: (stamp, px).
+        self._distances: deque[tuple[float, float]] = deque()
 
     def lock_here(self) -> None:
         """Lock anew on what lies at the fovea as soon as the eyes rest, as after a saccade."""
@@ -112,18 +115,33 @@ class TargetTracker:
             EyeView(self._cameras[1], eyes.pan_right_rad, eyes.tilt_rad),
         )
         before, self._before, self._stamp_s = self._before, left, stamp_s
-        if state.saccading:
-            self._former, self._target, self._wants_lock = self._target or self._former, None, True
-            return self._without(TrackStatus.LOCKING, "the left eye is in a saccade")
+        self._wants_lock |= state.saccading
         if self._target is not None:
-            return self._follow(self._target, left, right, stamp_s, views)
+            track = self._follow(self._target, left, right, stamp_s, views)
+            self._wants_lock &= not self._is_kept(track, left, stamp_s)
+            if not self._wants_lock:
+                return track
         if not self._wants_lock:
-            # A new target may have taken its place, and eyes that are held make no saccade to say so.
-            self._wants_lock = min(state.rested_s, stamp_s - self._lost_s) >= self._parameters.track_relock_s
-            return self._without(TrackStatus.LOST, "the target was hidden too long; locking anew once the eyes rest")
+            return self._without(TrackStatus.LOST, "the target was hidden too long; waiting for a saccade")
+        if state.saccading:
+            return self._without(TrackStatus.LOCKING, "the left eye is in a saccade")
         if not self._at_rest(state, before, left):
             return self._without(TrackStatus.LOCKING, "the eyes came to rest just now")
         return self._lock(left, right, stamp_s, views)
+
+    def _is_kept(self, track: Track, left: Image, stamp_s: float) -> bool:
+        """Tell whether the eye turned towards the target, or with it, rather than away to something else."""
+        if track.status not in (TrackStatus.OK, TrackStatus.OCCLUDED):
+            return False
+        p = self._parameters
+        away_px = distance(track.left_px, _fovea(left))
+        saccade_px = self._cameras[0].fx_px * math.tan(math.radians(p.track_saccade_deg))
+        if not self._wants_lock:
+            self._distances.append((stamp_s, away_px))
+            while self._distances[0][0] < stamp_s - p.track_saccade_s:
+                self._distances.popleft()
+        before_px = self._distances[0][1] if self._distances else 0.0
+        return away_px < max(_KEPT_SHARE * saccade_px, before_px + 0.5 * saccade_px)
 
     def _at_rest(self, state: EyeState, before: Image | None, left: Image) -> bool:
         """Tell whether the left eye rests: its joints, and its image unless that has moved for too long already."""
@@ -137,31 +155,19 @@ class TargetTracker:
         return Track(self._track_id, nan, _NOWHERE, _NOWHERE, nan, nan, nan, (nan, nan), 0.0, status, reason)
 
     def _lock(self, left: Image, right: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Track:
-        """Lock on what lies at the fovea; a target the eyes turned to by a saccade may have moved on a little."""
-        h, w = left.shape
-        point = self._former_near(((w - 1) / 2, (h - 1) / 2), left, stamp_s, views)
+        """Lock on what lies at the fovea."""
+        self._target, point = None, _fovea(left)
         disparity = self._estimator.estimate(left, right, point)
         if disparity.status is DisparityStatus.NO_TEXTURE:
             return self._without(TrackStatus.UNLOCKED, "nothing at the fovea to lock on")
         point, extent, disparity = self._segment(left, right, point, disparity, views)
         self._track_id += 1
-        self._wants_lock, self._former = False, None
+        self._wants_lock = False
+        self._distances.clear()
         looks = Appearance(left, point, extent or _USUAL_EXTENT_PX)
         direction = views[0].direction(point)
         self._target = _Target(self._track_id, stamp_s, looks, stamp_s, direction, np.zeros(3), extent is not None)
         return self._tell(self._target, Sighting(point, 1.0, 0), disparity, views)
-
-    def _former_near(self, fovea: Pixel, left: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Pixel:
-        """Return where the target of before the saccade is seen, if that is near the fovea, else the fovea."""
-        p, former = self._parameters, self._former
-        if former is None or stamp_s - former.seen_s > p.track_give_up_s:
-            return fovea
-        expected = views[0].pixel(former.predicted(stamp_s))
-        if not distance(expected, fovea) <= 2.0 * p.track_search_px:
-            return fovea
-        sighting = former.looks.search(left, expected, p.track_search_px)
-        near = distance(sighting.pixel, fovea) <= p.track_search_px
-        return sighting.pixel if near and sighting.likeness >= p.track_reacquire_likeness else fovea
 
     def _segment(
         self, left: Image, right: Image, point: Pixel, disparity: Disparity, views: tuple[EyeView, EyeView]
@@ -352,6 +358,10 @@ def _plausible(disparity: Disparity, expected_px: float | None, jump_px: float) 
         return True
     near = expected_px is not None and abs(disparity.horizontal_px - expected_px) <= min(jump_px, 4.0)
     return disparity.status is DisparityStatus.AMBIGUOUS and near
+
+
+def _fovea(image: Image) -> Pixel:
+    return (image.shape[1] - 1) / 2, (image.shape[0] - 1) / 2
 
 
 def _inside(pixel: Pixel, image: Image) -> bool:
