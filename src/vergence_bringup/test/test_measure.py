@@ -1,0 +1,94 @@
+"""`vergence measure`: the paper's flowchart on stored images, through the command line."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from vergence_bringup.command_line import main
+
+DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "stereo_chessboard"
+
+
+def brute_force(from_mask, to_mask):
+    a, b = np.argwhere(from_mask), np.argwhere(to_mask)
+    if not len(a) or not len(b):
+        return None
+    squares = ((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2)
+    return float(np.sqrt(squares.min(axis=1)).mean())
+
+
+def check(figures, out):
+    left, right = (cv2.imread(str(out / f"{eye}_edges.png"), cv2.IMREAD_GRAYSCALE) for eye in ("left", "right"))
+    h, w = left.shape
+    for i, size in enumerate(figures["windows_px"]):
+        rows = slice(h // 2 - size // 2, h // 2 - size // 2 + size)
+        columns = slice(w // 2 - size // 2, w // 2 - size // 2 + size)
+        a, b = left[rows, columns], right[rows, columns]
+        assert figures["left_to_right_px"][i] == pytest.approx(brute_force(a, b), abs=1e-9)
+        assert figures["right_to_left_px"][i] == pytest.approx(brute_force(b, a), abs=1e-9)
+
+
+@pytest.fixture
+def pair(tmp_path):
+    rng = np.random.default_rng(5)
+    scene = cv2.resize(rng.integers(0, 255, (30, 44), dtype=np.uint8), (660, 450), interpolation=cv2.INTER_CUBIC)
+    paths = tmp_path / "left.png", tmp_path / "right.png"
+    cv2.imwrite(str(paths[0]), scene[:401, 10:631])
+    cv2.imwrite(str(paths[1]), scene[:401, 14:635])
+    return [str(path) for path in paths]
+
+
+def test_json_is_the_definition_on_the_edge_images_it_saves(pair, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["measure", *pair, "--out", str(out), "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["windows_px"] == [50, 100, 150, 200, 250, 300]
+    check(figures, out)
+    assert (out / "combined_edges.png").is_file()
+
+
+def test_the_table_has_a_row_a_window(pair, capsys):
+    assert main(["measure", *pair, "--windows", "64", "128"]) == 0
+    text = capsys.readouterr().out
+    assert "64x64" in text
+    assert "128x128" in text
+    assert text.count(" px") == 4
+
+
+def test_a_blank_pair_is_null_and_no_edges(tmp_path, capsys):
+    path = tmp_path / "blank.png"
+    cv2.imwrite(str(path), np.full((120, 160), 90, np.uint8))
+    assert main(["measure", str(path), str(path), "--windows", "50", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["left_to_right_px"] == [None]
+    assert main(["measure", str(path), str(path), "--windows", "50"]) == 0
+    assert "no edges" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "words"),
+    [
+        ("absent.png", None, "absent.png"),
+        ("text.png", None, "text.png"),
+        (None, "small.png", "small"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(pair, tmp_path, capsys, left, right, words):
+    (tmp_path / "text.png").write_text("no picture")
+    cv2.imwrite(str(tmp_path / "small.png"), np.zeros((20, 30, 3), np.uint8))
+    arguments = [str(tmp_path / left) if left else pair[0], str(tmp_path / right) if right else pair[1]]
+    assert main(["measure", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("vergence measure: ")
+    assert error.count("\n") == 1
+    assert words in error or "(20, 30)" in error
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the real pairs (../shared/data/stereo_chessboard) are not here")
+@pytest.mark.parametrize("number", [1, 4])
+def test_real_pairs(number, tmp_path, capsys):
+    pair = [str(DATA / f"{eye}0{number}.jpg") for eye in ("left", "right")]
+    assert main(["measure", *pair, "--out", str(tmp_path), "--json", "--windows", "50", "100"]) == 0
+    check(json.loads(capsys.readouterr().out), tmp_path)
