@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 from vergence_servo.gaze.controller import GazeController
 from vergence_servo.gaze.fake_head import FakeHead, Seeing
 from vergence_servo.gaze.goals import Goal, GoalKind, Outcome, Result
-from vergence_servo.gaze.observations import PointSighting
+from vergence_servo.gaze.observations import FoveaDisparity, PointSighting
 from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.phases import Phase
 
@@ -218,20 +219,19 @@ def test_preempted_cancelled_and_stopped() -> None:
 
 
 def test_estimators_that_disagree_hold_the_eyes_still() -> None:
-    run = Run(rig_with(IDEAL), fixed(0.7, 0.05, 0.0), GazeParameters())
+    unattainable = GazeParameters(contrast_enter=0.01)  # so that the goal is still in hand when they begin to differ
+    run = Run(rig_with(IDEAL), fixed(0.7, 0.05, 0.0), unattainable)
     run.click()
     run.until(1.0)
-    assert run.report.verged
     original = run.head._send
 
     def shifted(arrival_s: float, observation: Any) -> None:
-        if type(observation).__name__ == "FoveaDisparity":
-            observation = type(observation)(**(vars(observation) | {"horizontal_rad": 0.08, "usable": True}))
+        if isinstance(observation, FoveaDisparity):
+            observation = replace(observation, horizontal_rad=0.08)
         original(arrival_s, observation)
 
     run.head._send = shifted  # type: ignore[method-assign]
-    run.until(1.12)  # what was seen before is still on its way
-    run.click()
     run.until(3.5)
-    assert run.outcomes[-1].result is Result.DISAGREEMENT
+    assert [outcome.result for outcome in run.outcomes] == [Result.DISAGREEMENT]
+    assert "disagree" in run.report.reason
     assert np.ptp(run.joints[-100:], axis=0).max() == 0.0

@@ -84,7 +84,7 @@ class FakeHead:
             self._plants[name] = ServoPlant(servo, start + self._random.uniform(-half, half), self.begin_s)
             self._models[name] = ServoPlant(joint.servo, start, self.begin_s)
         self._reported_rad = {name: self.start_rad.get(name, 0.0) for name in JOINT_NAMES}
-        self._track_id, self._lock_s = 0, math.inf
+        self._track_id, self._lock_s = 1, self.begin_s + 0.1
         self._pending_frame: tuple[float, Array, bool] | None = None
         self._left_pixel = np.full(2, math.nan)
         self._fast_s = -math.inf

@@ -63,7 +63,7 @@ class JointHistory:
         if not math.isfinite(stamp_s):
             return False
         if self._stamps and stamp_s < self._stamps[-1] - _CLOCK_JUMP_S:
-            self._stamps, self._reported, self._shaft = [], [], []
+            self.forget()
         if self._stamps and stamp_s <= self._stamps[-1]:
             return False
         angles = self._reported[-1].copy() if self._stamps else np.full(3, np.nan)
@@ -81,6 +81,10 @@ class JointHistory:
         if surplus > 64:
             del self._stamps[:surplus], self._reported[:surplus], self._shaft[:surplus]
         return True
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._stamps, self._reported, self._shaft = [], [], []
 
     def covers(self, stamp_s: float) -> bool:
         """Tell whether the angles at `stamp_s` are known: not before the first report and not far after the last."""

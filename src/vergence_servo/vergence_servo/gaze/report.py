@@ -10,6 +10,7 @@ from vergence_rig.geometry import GeometryError, eye_direction, eye_position, fi
 from vergence_servo.gaze.distance import TargetPosition
 from vergence_servo.gaze.goals import Outcome
 from vergence_servo.gaze.phases import Phase
+from vergence_servo.gaze.target_filter import TargetEstimate
 
 Array = npt.NDArray[np.float64]
 
@@ -48,8 +49,25 @@ class Command:
     outcomes: tuple[Outcome, ...]
 
 
+def residual_of(estimate: TargetEstimate | None, joints_rad: Array) -> tuple[float, float, float]:
+    """Return version, vergence and tilt [rad] that are left to turn from these joint angles (3,); NaN if unknown."""
+    if estimate is None:
+        return math.nan, math.nan, math.nan
+    version, vergence = 0.5 * float(joints_rad[0] + joints_rad[1]), float(joints_rad[1] - joints_rad[0])
+    return estimate.version_rad - version, estimate.vergence_rad - vergence, estimate.tilt_rad - float(joints_rad[2])
+
+
+def disparity_px(vergence_residual_rad: float, focal_px: float) -> float:
+    """Return the horizontal disparity [px] that a vergence residual shows as at the fovea; NaN for NaN."""
+    if not abs(vergence_residual_rad) < 1.5:
+        return math.nan
+    return focal_px * math.tan(vergence_residual_rad)
+
+
 def fixation_of_joints(joints_rad: Array, baseline_m: float) -> tuple[Array, float]:
     """Return where the axes at these joint angles (3,) meet, (3,) [m], and their miss distance; NaN if nowhere."""
+    if not np.isfinite(joints_rad).all():
+        return np.full(3, math.nan), math.nan
     try:
         fixation = fixation_of_rays(
             eye_position(True, baseline_m),

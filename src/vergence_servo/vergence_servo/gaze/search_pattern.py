@@ -41,6 +41,35 @@ class SearchPattern:
         return nearest
 
 
+class Searcher:
+    """Goes through the pattern: travels to a place, rests there for a look, goes on."""
+
+    def __init__(self, rig: Rig, tilt_enabled: bool, vergence_rad: float, dwell_s: float) -> None:
+        self._make = lambda: SearchPattern(rig, tilt_enabled, vergence_rad)
+        self._half_vergence_rad = 0.5 * vergence_rad
+        self._dwell_s = dwell_s
+        self.stop()
+
+    def stop(self) -> None:
+        """The search is over; the next begins with all places unvisited."""
+        self._pattern: SearchPattern | None = None
+        self._until_s = -math.inf
+        self._place = (math.nan, math.nan)
+
+    def wanted(self, now_s: float, shaft_rad: Array, speed_rad_s: Array) -> Array:
+        """Return the joint angles (3,) to look at next, given the present ones (3,) and the joints' speeds (3,)."""
+        if self._pattern is None:
+            self._pattern = self._make()
+        if now_s > self._until_s:
+            version, tilt = 0.5 * float(shaft_rad[0] + shaft_rad[1]), float(shaft_rad[2])
+            self._place = self._pattern.next(version, tilt)
+            away = (abs(self._place[0] - version), abs(np.nan_to_num(self._place[1] - tilt)))
+            travel_s = max(away[0] / float(speed_rad_s[:2].min()), away[1] / float(speed_rad_s[2]))
+            self._until_s = now_s + travel_s + self._dwell_s
+        version, tilt = self._place
+        return np.array([version - self._half_vergence_rad, version + self._half_vergence_rad, tilt])
+
+
 def _places(lowest: float, highest: float, field_rad: float) -> list[float]:
     """Centres of fields of view that together cover from half a field's edge below to above the limits."""
     count = max(1, math.ceil((highest - lowest) / field_rad))

@@ -21,7 +21,8 @@ _EVIDENCE_FADE = 0.8
 _EVIDENCE_TO_MOVE = 7.0
 _EVIDENCE_TO_REST = -2.0
 _EVIDENCE_BOUNDS = (-6.0, 15.0)
-_SIGNIFICANT_RATE = 16.0
+_EVIDENCE_SURE = 11.0
+_SIGNIFICANT_RATE = 9.0
 _COAST_STRAIGHT_S = 0.15
 _COAST_FADE_S = 0.3
 _JUMP_SIGMA_RAD = 0.3
@@ -252,7 +253,8 @@ class TargetFilter:
             self._models[0].state[0::2] = self._models[1].state[0::2]
             self._models[0].covariance[0::2, 0::2] = self._models[1].covariance[0::2, 0::2]
             return True
-        if not self._moving and self._evidence > _EVIDENCE_TO_MOVE and significant:
+        enough = _EVIDENCE_TO_MOVE if significant else _EVIDENCE_SURE
+        if not self._moving and self._evidence > enough:
             self._moving = True
         return False
 
@@ -276,18 +278,21 @@ class TargetFilter:
         return True
 
     def _jump(self, measurement: Measurement) -> None:
-        affected = np.flatnonzero(np.abs(measurement.coefficients).max(axis=0) > 0)
-        if measurement.coefficients.shape[0] < len(affected):
-            # One eye's direction leaves the distance open: a jump sideways keeps the vergence.
-            affected = affected[affected != 1] if 0 in affected else affected
+        """Open the estimate for a target that is elsewhere, in the directions that the measurement tells of."""
+        seen = np.abs(measurement.coefficients).max(axis=0) > 0
+        if not seen[0]:
+            # Only the depth: the left eye, which saw it, stays where it is.
+            ways = np.array([[0.5, 1.0, 0.0]])
+        elif len(measurement.values) < 3:
+            # One eye's direction leaves the depth open: a jump sideways keeps the vergence.
+            ways = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        else:
+            ways = np.eye(3)
+        spread = ways.T @ ways
         for model in self._models:
-            for axis in affected:
-                i = 2 * int(axis)
-                model.covariance[[i, i + 1], :] = 0.0
-                model.covariance[:, [i, i + 1]] = 0.0
-                model.covariance[i, i] = _JUMP_SIGMA_RAD**2
-                if model.moves:
-                    model.covariance[i + 1, i + 1] = _RATE_SIGMA_RAD_S**2
-                model.state[i + 1] = 0.0
+            model.covariance[0::2, 0::2] += spread * _JUMP_SIGMA_RAD**2
+            model.state[1::2] = 0.0
+            if model.moves:
+                model.covariance[1::2, 1::2] += np.eye(3) * _RATE_SIGMA_RAD_S**2
         self._evidence, self._moving = 0.0, False
         self._outliers.clear()

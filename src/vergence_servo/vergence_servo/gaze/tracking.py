@@ -6,6 +6,7 @@ depth of whatever lies there, and counts while the target does.
 """
 
 import math
+from collections import deque
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +25,11 @@ Array = npt.NDArray[np.float64]
 _TIMING_SIGMA_S = 0.003
 _MOVE_VARIANCE_RAD = 8e-3
 _TURN_SHARE = 0.35
+_FIRST_SHARE = 0.6
 _FRESH_S = 0.15
 _DISAGREEING_PAIRS = 5
+_SIGMA_BOUNDS_RAD = (1e-5, 0.5)
+_WIDEST_RAD = 1.5
 
 
 class TargetTracking:
@@ -43,6 +47,7 @@ class TargetTracking:
         )
         self._last_reported: Array | None = None
         self._last_direction = np.zeros(3)
+        self._moves: deque[tuple[float, Array]] = deque(maxlen=200)
         self.clear()
 
     def clear(self) -> None:
@@ -95,7 +100,7 @@ class TargetTracking:
         return self.filter.at(time_s) if self.filter.initialised else None
 
     def note_motion(self) -> None:
-        """Take what the joints have moved since the last call into the filter's uncertainty."""
+        """Take how the joints have moved in the newest report as doubt about their angles, from its stamp on."""
         reported = self._history.reported_rad
         if self._last_reported is None:
             self._last_reported = reported
@@ -107,16 +112,21 @@ class TargetTracking:
         half_play = self._history.half_play_rad
         direction = np.sign(move)
         turned = (direction != 0) & (direction != self._last_direction)
+        # Before its first move a shaft may lie anywhere in its play.
+        share = np.where(self._last_direction == 0, _FIRST_SHARE, _TURN_SHARE)
         self._last_direction = np.where(direction != 0, direction, self._last_direction)
-        variances = _MOVE_VARIANCE_RAD * half_play * np.abs(move) + np.where(
-            turned, (_TURN_SHARE * half_play) ** 2, 0.0
-        )
-        if self.filter.initialised and np.any(variances):
-            self.filter.loosen(variances)
+        variances = _MOVE_VARIANCE_RAD * half_play * np.abs(move) + turned * (share * half_play) ** 2
+        if np.any(variances):
+            self._moves.append((self._history.newest_s, variances))
+
+    def _loosen_before(self, stamp_s: float) -> None:
+        """Tell the filter of the moves before an exposure: an image from before a move knows nothing of its doubt."""
+        while self._moves and self._moves[0][0] <= stamp_s:
+            self.filter.loosen(self._moves.popleft()[1])
 
     def see_track(self, sighting: TrackSighting, now_s: float) -> bool:
         """Take a track; True if it was the target's and was believed."""
-        if not sighting.usable or not self._eyes_were_still(sighting.stamp_s, sighting.skew_s):
+        if not sighting.usable or not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
         joints = self._history.shaft_at(sighting.stamp_s)
         pan, tilt = directions.direction_angles(joints[0], joints[2], sighting.left_x, sighting.left_y)
@@ -125,7 +135,7 @@ class TargetTracking:
         offset_pan, offset_tilt = self._track_offset
         sigma = self._sigma(sighting.stamp_s, self._p.direction_sigma_rad)
         if math.isfinite(sighting.disparity_rad):
-            right_x = math.tan(math.atan(sighting.left_x) - sighting.disparity_rad)
+            right_x = _tangent(math.atan(sighting.left_x) - sighting.disparity_rad)
             measurement, (left_pan, right_pan, seen_tilt) = directions.both_eyes(
                 self._history,
                 sighting.stamp_s,
@@ -152,7 +162,7 @@ class TargetTracking:
         if not (sighting.usable and sighting.confidence >= self._p.minimum_confidence):
             self.note = sighting.reason or "no confident disparity at the fovea"
             return False
-        if not self._eyes_were_still(sighting.stamp_s, sighting.skew_s) or not self._at_fovea(sighting.stamp_s):
+        if not self.eyes_were_still(sighting.stamp_s, sighting.skew_s) or not self._at_fovea(sighting.stamp_s):
             return False
         sigma = self._sigma(sighting.stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
         measurement = directions.fovea_vergence(
@@ -171,14 +181,14 @@ class TargetTracking:
         """Take a detected target; True if it is of the wanted class and was believed."""
         if self.class_name is None or not sighting.usable or self.class_name not in ("", sighting.class_name):
             return False
-        if not self._eyes_were_still(sighting.stamp_s, sighting.skew_s):
+        if not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
         sigma = self._sigma(sighting.stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
-        left = (math.tan(sighting.left_azimuth_rad), math.tan(sighting.left_elevation_rad))
-        right = (math.tan(sighting.right_azimuth_rad), math.tan(sighting.right_elevation_rad))
+        left = (_tangent(sighting.left_azimuth_rad), _tangent(sighting.left_elevation_rad))
+        right = (_tangent(sighting.right_azimuth_rad), _tangent(sighting.right_elevation_rad))
         if math.isfinite(left[0]) and math.isfinite(right[0]):
             disparity = sighting.surface_disparity_rad
-            right_x = math.tan(sighting.left_azimuth_rad - disparity) if math.isfinite(disparity) else right[0]
+            right_x = _tangent(sighting.left_azimuth_rad - disparity) if math.isfinite(disparity) else right[0]
             measurement, seen_both = directions.both_eyes(
                 self._history, sighting.stamp_s, sighting.skew_s, left, right_x, sigma, 0.0
             )
@@ -209,6 +219,7 @@ class TargetTracking:
     def _believe(
         self, measurement: Measurement, seen_rad: Array, skew_s: float, now_s: float, source: str, may_jump: bool = True
     ) -> bool:
+        self._loosen_before(measurement.stamp_s)
         if not self.filter.update(measurement, may_jump):
             self.note = (
                 f"{source} differs from the prediction by {math.degrees(self.filter.last_innovation_rad):.1f} deg"
@@ -216,7 +227,8 @@ class TargetTracking:
             return False
         at_left = self._history.shaft_at(measurement.stamp_s)
         at_right = self._history.shaft_at(measurement.stamp_s + skew_s)
-        self.visual = VisualError(measurement.stamp_s, seen_rad - np.array([at_left[0], at_right[1], at_left[2]]))
+        error_rad = seen_rad - np.array([at_left[0], at_right[1], at_left[2]])
+        self.visual = VisualError(measurement.stamp_s, seen_rad, error_rad)
         self.seen_s, self.source, self.note = now_s, source, ""
         return True
 
@@ -228,7 +240,8 @@ class TargetTracking:
         sigma = wide if len(measurement.values) > 2 else self._p.prior_vergence_sigma_rad
         self.filter.start(measurement.stamp_s, angles, np.diag(np.square([wide, sigma, wide])))
 
-    def _eyes_were_still(self, stamp_s: float, skew_s: float) -> bool:
+    def eyes_were_still(self, stamp_s: float, skew_s: float) -> bool:
+        """Tell whether the eyes turned slowly enough, and for long enough before, for a pair to be used."""
         if not (math.isfinite(stamp_s) and math.isfinite(skew_s) and abs(skew_s) < 0.1):
             return False
         if not self._history.covers(stamp_s):
@@ -262,12 +275,23 @@ class TargetTracking:
         if distance > self._p.adopt_radius_rad:
             self.note = f"the tracker follows something {math.degrees(distance):.1f} deg away"
             return False
+        vergence_off = self._track_vergence_off(sighting, estimate)
+        if abs(vergence_off) > 4.0 * float(estimate.sigmas_rad[1]) + self._p.disagreement_rad:
+            self.note = f"the tracker follows something {math.degrees(vergence_off):.1f} deg nearer or farther"
+            return False
         # The first lock after a click keeps the click: what was asked for may lie beside the middle of what is tracked,
         # and a tracker that did not lock anew because the move was small still follows its old target next to it.
         first = self._track_id is None
         self._track_offset = offset if first else (0.0, 0.0)
         self._track_id = sighting.track_id
         return True
+
+    def _track_vergence_off(self, sighting: TrackSighting, estimate: TargetEstimate) -> float:
+        """Return by how much the track's vergence differs from the target's [rad]; 0 while it has none."""
+        if not math.isfinite(sighting.disparity_rad):
+            return 0.0
+        shaft = self._history.shaft_at(sighting.stamp_s)
+        return float(shaft[1] - shaft[0]) + sighting.disparity_rad - estimate.vergence_rad
 
     def _compare_with_track(self, stamp_s: float, vergence_rad: float) -> None:
         track_s, track_vergence, extent = self._track_vergence
@@ -281,7 +305,14 @@ class TargetTracking:
 
 
 def _positive(sigma_rad: float, fallback_rad: float) -> float:
-    return sigma_rad if math.isfinite(sigma_rad) and sigma_rad > 0 else fallback_rad
+    if not (math.isfinite(sigma_rad) and sigma_rad > 0):
+        return fallback_rad
+    return min(max(sigma_rad, _SIGMA_BOUNDS_RAD[0]), _SIGMA_BOUNDS_RAD[1])
+
+
+def _tangent(angle_rad: float) -> float:
+    """Return the normalised coordinate of an angle; NaN for one that no lens sees."""
+    return math.tan(angle_rad) if abs(angle_rad) < _WIDEST_RAD else math.nan
 
 
 __all__ = ["SightingError", "TargetTracking"]

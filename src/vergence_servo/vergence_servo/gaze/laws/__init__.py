@@ -3,11 +3,16 @@
 from collections.abc import Callable
 
 from vergence_rig.rig import Rig
+from vergence_servo.gaze.laws.metric_descent import MetricDescentLaw
+from vergence_servo.gaze.laws.pd_bangbang import PdBangbangLaw
+from vergence_servo.gaze.laws.pid_pursuit import PidPursuitLaw
 from vergence_servo.gaze.laws.predictive import PredictiveLaw
-from vergence_servo.gaze.laws.protocol import Law, LawView, VisualError
+from vergence_servo.gaze.laws.protocol import Contrast, Law, LawView, VisualError
 from vergence_servo.gaze.parameters import GazeParameters
 
-_LAWS: dict[str, Callable[[Rig, GazeParameters], Law]] = {"predictive": PredictiveLaw}
+_LAWS: dict[str, Callable[[Rig, GazeParameters], Law]] = {
+    law.name: law for law in (PredictiveLaw, PdBangbangLaw, PidPursuitLaw, MetricDescentLaw)
+}
 
 
 def make_law(rig: Rig, parameters: GazeParameters) -> Law:
@@ -15,4 +20,4 @@ def make_law(rig: Rig, parameters: GazeParameters) -> Law:
     return _LAWS[parameters.law](rig, parameters)
 
 
-__all__ = ["Law", "LawView", "VisualError", "make_law"]
+__all__ = ["Contrast", "Law", "LawView", "VisualError", "make_law"]

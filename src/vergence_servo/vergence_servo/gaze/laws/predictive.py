@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.rig import Rig
-from vergence_servo.gaze.laws.protocol import LawView
+from vergence_servo.gaze.laws.protocol import LawView, target_residual
 from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.phases import Phase
 from vergence_servo.gaze.servo_inverse import ServoInverse
@@ -16,6 +16,7 @@ class PredictiveLaw:
     """Commands the predicted target: in a saccade as it will be at the landing, else at the command's effect."""
 
     name = "predictive"
+    unsigned = False
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
         half_play = np.array(
@@ -40,4 +41,8 @@ class PredictiveLaw:
 
     def residual(self, view: LawView) -> Array:
         """Return how far each driven joint (3,) is from the target now."""
-        return np.where(view.driven, view.goal(view.target.at(view.now_s).joints_rad) - view.shaft_rad, 0.0)
+        return target_residual(view)
+
+    def remaining_rad(self) -> float:
+        """Return 0: the signed error says it."""
+        return 0.0
