@@ -49,7 +49,7 @@ class PairMeasurement:
         return self._estimator.estimate(edge.left_grey, edge.right_grey)
 
     def verged(self, edge: EdgeMetricResult, error_px: float, confidence: float) -> bool:
-        """Tell whether the eyes are verged, by the contrast and the signed error of a pair, and by the last verdict."""
+        """Tell whether the eyes are verged, by the fovea's contrast, the signed error, and the last verdict."""
         return self._judge.update(edge.foveal_contrast, error_px, confidence)
 
     def track(self, edge: EdgeMetricResult, stamp_s: float, eyes: EyeAngles | None, models: Models | None) -> Track:
