@@ -21,7 +21,10 @@ _GUARD_PX = 4  # disparities tried beyond the tolerance on both sides
 _LOCAL_MEAN_PX = 8.0
 _MINIMUM_GRADIENT = 4.0  # grey levels per pixel, averaged over the window
 _ADVANTAGE = 0.85  # the best disparity outside must fit this much worse
+_LEFT_OVER = 0.5  # share of the local contrast that a match may leave; unrelated patches leave about 1.4
+_NOISE = 2.0  # grey levels, mean absolute difference
 _CLOSING_PX = 11
+_OPENING_PX = 7  # thinner outgrowths are chance
 _MINIMUM_AREA_PX = 40
 
 
@@ -29,9 +32,9 @@ _MINIMUM_AREA_PX = 40
 class ZeroDisparity:
     """The region at one disparity.
 
-    `mask` (h, w) bool covers an area of the left image whose top-left pixel is `origin_px`; `centroid_px` (x, y) and
-    `extent_px` (width, height) of the region are in the left image, NaN if there is none. `features` counts the pixels
-    that passed, `touches_border` tells that the region may reach beyond the area looked at.
+    `mask` (h, w) bool covers an area of the left image whose top-left pixel is `origin_px`. `centroid_px` (x, y) and
+    `extent_px` (width and height of the rectangle that spreads alike) are in the left image, NaN if there is no region.
+    `features` counts the pixels that passed, `touches_border` tells that the region may reach beyond the area looked at.
     """
 
     mask: NDArray[np.bool_]
@@ -79,7 +82,9 @@ def zero_disparity(
     flat_right = _without_mean(cut(right, x0 - d - spread, y0 - v, side + 2 * spread, side))
     agreement, beside = _costs(flat_left, flat_right, tolerance_px, spread)
     gradient = cv2.boxFilter(np.abs(cv2.Sobel(flat_left, cv2.CV_32F, 1, 0, scale=0.125)), -1, (_WINDOW_PX, _WINDOW_PX))
-    passed = (agreement < _ADVANTAGE * beside) & (gradient > _MINIMUM_GRADIENT / 2)
+    contrast = cv2.boxFilter(np.abs(flat_left), -1, (_WINDOW_PX, _WINDOW_PX))
+    passed = (agreement < _ADVANTAGE * beside) & (agreement < _LEFT_OVER * contrast + _NOISE)
+    passed &= gradient > _MINIMUM_GRADIENT / 2
     passed &= _inside(x0, y0, d, side, width, height)
     return _region(passed, (x0, y0), (x, y), reach_px)
 
@@ -143,18 +148,35 @@ def _region(
     if not fit.any():
         return nothing
     chosen = int(np.argmin(np.where(fit, nearest, np.inf)))
-    mask = _filled(labels == chosen)
+    mask = _trimmed(_filled(labels == chosen))
     ys, xs = np.nonzero(mask)
+    if len(xs) == 0:
+        return nothing
     side = passed.shape[0]
     return ZeroDisparity(
         mask,
         origin,
         (float(xs.mean()) + origin[0], float(ys.mean()) + origin[1]),
-        (float(xs.max() - xs.min() + 1), float(ys.max() - ys.min() + 1)),
+        (_side(xs), _side(ys)),
         len(xs),
         int((passed & mask).sum()),
         bool(xs.min() == 0 or ys.min() == 0 or xs.max() == side - 1 or ys.max() == side - 1),
     )
+
+
+def _side(coordinates: NDArray[np.intp]) -> float:
+    """Return the side of the uniform bar that spreads like these: what sticks out of a region hardly adds to it."""
+    return math.sqrt(12.0 * float(coordinates.var()) + 1.0)
+
+
+def _trimmed(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the largest part that is left when thin outgrowths are cut off."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_OPENING_PX, _OPENING_PX))
+    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=4)
+    if count < 2:
+        return np.zeros(mask.shape, bool)
+    return np.asarray(labels == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax()))
 
 
 def _filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
