@@ -36,8 +36,9 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
     try:
         if stop_asked.is_set():
             return 0
-        node = make_node()
+        # First the executor: one that is made after the shutdown leaves a complaint of its own behind.
         executor = SingleThreadedExecutor()
+        node = make_node()
         executor.add_node(node)
         executor.spin()
     except ExternalShutdownException:

@@ -68,6 +68,7 @@ class SimNode(Node):
         self._started.wait()
         if self._failure is not None:
             raise OSError(str(self._failure)) from self._failure
+        self.get_logger().info("the room is ready")
 
     def close(self) -> None:
         """End the simulation."""

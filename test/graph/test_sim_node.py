@@ -1,0 +1,124 @@
+"""sim_node in a graph: it speaks as cameras, servos and truth, and refuses what cannot be."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PointStamped
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
+
+from vergence_common.images import compressed_to_array, image_to_array
+from vergence_common.qos import IMAGE_QOS
+from vergence_common.stamps import to_nanoseconds
+from vergence_msgs.msg import TrueBoxes, TrueVergence
+from vergence_sim.renderer import RenderError
+from vergence_sim.sim_node import SimNode
+from vergence_sim.simulator import Simulator
+
+pytestmark = pytest.mark.graph
+
+
+@pytest.fixture(scope="module", autouse=True)
+def opengl() -> None:
+    try:
+        Simulator().close()
+    except RenderError as error:
+        pytest.skip(f"no OpenGL here: {error}")
+
+
+@pytest.fixture
+def sim(graph: Any) -> SimNode:
+    # Slow frames: many tests may share this machine.
+    node: SimNode = graph.start(SimNode, frame_rate_hz=10.0, right_clock_offset_s=0.02)
+    return node
+
+
+def test_both_eyes_come_with_their_stamps_frames_and_calibration(graph: Any, sim: SimNode) -> None:
+    left = graph.message(Image, "left/image_raw", qos=IMAGE_QOS)
+    right = graph.message(Image, "right/image_raw", qos=IMAGE_QOS)
+    info = graph.message(CameraInfo, "left/camera_info")
+    jpeg = graph.message(CompressedImage, "right/image_raw/compressed", qos=IMAGE_QOS)
+    pictures = {"left": graph.wait(left), "right": graph.wait(right)}
+    for eye, message in pictures.items():
+        assert message.header.frame_id == f"{eye}_camera_optical_frame"
+        assert image_to_array(message).shape == (480, 640, 3)
+        age_s = (graph.client.get_clock().now().nanoseconds - to_nanoseconds(message.header.stamp)) * 1e-9
+        assert 0.04 < age_s < 20
+    skew_ns = to_nanoseconds(pictures["right"].header.stamp) - to_nanoseconds(pictures["left"].header.stamp)
+    # Any two frames differ by the offset and whole periods.
+    periods = (skew_ns * 1e-9 - 0.02) / 0.1
+    assert periods == pytest.approx(round(periods), abs=0.05)
+    calibration = graph.wait(info)
+    assert (calibration.width, calibration.height, calibration.k[0]) == (640, 480, 539.0)
+    assert list(calibration.d) == [-0.04, 0.02, 0.0, 0.0, 0.0]
+    assert compressed_to_array(graph.wait(jpeg)).shape == (480, 640, 3)
+
+
+def test_a_command_turns_the_head_and_the_truth_follows(graph: Any, sim: SimNode) -> None:
+    command = graph.client.create_publisher(JointState, "joint_command", 10)
+    graph.wait_until(command.get_subscription_count, "sim_node to listen")
+    command.publish(JointState(name=["pan_left", "tilt"], position=[0.2, -0.1]))
+    arrived = graph.wait(graph.message(JointState, "joint_states", lambda m: 0.2 in m.position and -0.1 in m.position))
+    angles = dict(zip(arrived.name, arrived.position, strict=True))
+    assert angles == pytest.approx({"pan_left": 0.2, "pan_right": 0.0, "tilt": -0.1})
+    truth = graph.wait(graph.message(TrueVergence, "ground_truth/vergence", lambda m: m.pan_left_rad > 0.15))
+    assert truth.pan_left_rad == pytest.approx(0.2, abs=0.02)
+    assert truth.tilt_rad == pytest.approx(-0.1, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("names", "positions", "words"),
+    [
+        (["pan_left", "neck"], [0.3, 0.1], "neck"),
+        (["pan_left"], [math.nan], "nan"),
+        (["pan_left", "tilt"], [0.3], "2 joints with 1 positions"),
+    ],
+)
+def test_a_command_that_cannot_be_is_refused_by_name_and_nothing_moves(
+    graph: Any, sim: SimNode, names: list[str], positions: list[float], words: str
+) -> None:
+    command = graph.client.create_publisher(JointState, "joint_command", 10)
+    graph.wait_until(command.get_subscription_count, "sim_node to listen")
+    command.publish(JointState(name=names, position=positions))
+    status = graph.diagnostic("commands", lambda s: s.level != b"\x00")
+    assert words in status.message
+    joints = graph.wait(graph.message(JointState, "joint_states"))
+    assert list(joints.position) == [0.0, 0.0, 0.0]
+
+
+def test_a_target_goes_where_it_is_put(graph: Any, sim: SimNode) -> None:
+    place = graph.client.create_publisher(PointStamped, "sim/target_pose", 10)
+    graph.wait_until(place.get_subscription_count, "sim_node to listen")
+    message = PointStamped()
+    message.header.frame_id = "rig_base"
+    message.point.x, message.point.y = 0.5, 0.1
+    place.publish(message)
+    truth = graph.wait(
+        graph.message(TrueVergence, "ground_truth/vergence", lambda m: abs(m.target_point.y - 0.0943) < 1e-3)
+    )
+    assert truth.target == "cube"
+    assert truth.left_visible_share == 1.0
+    boxes = graph.wait(graph.message(TrueBoxes, "ground_truth/boxes", lambda m: bool(m.left)))
+    box = boxes.left[0]
+    assert box.x_min_px < truth.left_x_px < box.x_max_px
+    assert box.y_min_px < truth.left_y_px < box.y_max_px
+    message.header.frame_id = "map"
+    place.publish(message)
+    status = graph.diagnostic("commands", lambda s: "map" in s.message)
+    assert "rig_base" in status.message
+
+
+def test_parameters_change_while_it_runs(graph: Any, sim: SimNode) -> None:
+    def clean(message: Image) -> bool:
+        pixels = image_to_array(message).astype(np.int16)
+        return float(np.abs(pixels[:, 1:] - pixels[:, :-1]).mean()) < limit
+
+    first = image_to_array(graph.wait(graph.message(Image, "left/image_raw", qos=IMAGE_QOS))).astype(np.int16)
+    limit = 0.8 * float(np.abs(first[:, 1:] - first[:, :-1]).mean())
+    result = graph.set_parameters(sim, noise_sigma=0.0, jpeg_quality=0)
+    assert result.successful
+    graph.wait(graph.message(Image, "left/image_raw", clean, qos=IMAGE_QOS))
+    refused = graph.set_parameters(sim, noise_sigma=0.0, motion="backwards")
+    assert not refused.successful
+    assert "backwards" in refused.reason

@@ -1,0 +1,81 @@
+"""Every node as users start it: clean ends on signals, one clear line and status 2 on what it cannot use."""
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from vergence_bringup.executables import EXECUTABLES
+from vergence_bringup.processes import find_executable
+
+pytestmark = pytest.mark.system
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+
+
+def _command(executable: str, *arguments: str) -> list[str]:
+    return [str(find_executable(EXECUTABLES[executable].package, executable)), "--ros-args", *arguments]
+
+
+def _run(executable: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(_command(executable, *arguments), capture_output=True, text=True, timeout=60)
+
+
+def _own_lines(text: str, executable: str) -> list[str]:
+    return [line for line in text.splitlines() if line.startswith(f"{executable}: ")]
+
+
+@pytest.mark.parametrize("executable", sorted(EXECUTABLES))
+def test_an_unknown_parameter_ends_the_node(executable: str, domain_id: int) -> None:
+    result = _run(executable, "--params-file", str(CONFIG / f"{executable}.yaml"), "-p", "no_such_parameter:=1")
+    assert result.returncode == 2
+    (line,) = _own_lines(result.stderr, executable)
+    assert "no_such_parameter" in line
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize("executable", sorted(EXECUTABLES))
+def test_a_rig_that_is_not_there_ends_the_node(executable: str, domain_id: int, tmp_path: Path) -> None:
+    arguments = ["-p", "device:=/dev/null"] if executable == "camera_node" else []
+    result = _run(executable, "-p", f"rig:={tmp_path / 'absent.yaml'}", *arguments)
+    assert result.returncode == 2
+    (line,) = _own_lines(result.stderr, executable)
+    assert "absent.yaml" in line
+
+
+@pytest.mark.parametrize("executable", sorted(EXECUTABLES))
+def test_a_file_that_is_not_yaml_ends_the_node(executable: str, domain_id: int, tmp_path: Path) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_text("/**: [ros__parameters: {")
+    result = _run(executable, "--params-file", str(path))
+    assert result.returncode == 2
+    (line,) = _own_lines(result.stderr, executable)
+    assert "broken.yaml" in line
+
+
+@pytest.mark.parametrize("delay_s", [0.1, 0.7, 1.5, 3.0])
+def test_sigterm_at_any_moment_ends_sim_node_without_complaint(delay_s: float, domain_id: int) -> None:
+    """Imports, the scene's compilation, and the first frames each meet the signal at some delay."""
+    process = subprocess.Popen(_command("sim_node"), stderr=subprocess.PIPE, text=True)
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(delay_s)
+    process.terminate()
+    _, errors = process.communicate(timeout=40)
+    # While Python still imports, the signal simply ends it: there is nothing to release yet.
+    assert process.returncode in (0, -signal.SIGTERM), errors
+    assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_running_node_with_status_0(number: int, domain_id: int) -> None:
+    process = subprocess.Popen(_command("sim_node"), stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    lines = []
+    for line in process.stderr:
+        lines.append(line)
+        if "ready" in line:
+            process.send_signal(number)
+    assert process.wait(40) == 0, lines
+    assert "Traceback" not in "".join(lines)
+    process.stderr.close()
