@@ -1,0 +1,199 @@
+"""Two Motion-JPEG streams through two camera nodes to one subscriber: frames lost, CPU time, delay.
+
+The cameras are recordings that are played at 30 Hz: everything behind the driver's buffer is what a webcam's frames go
+through. The peer is a node that decodes each frame and makes a JPEG of it again (camera_transcoder.py).
+"""
+
+import contextlib
+import itertools
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import CompressedImage
+
+from bench.harness import Row
+from vergence_bringup.processes import NodeCommand, environment
+from vergence_common.domains import own_domain
+from vergence_common.qos import IMAGE_QOS
+from vergence_common.stamps import to_nanoseconds
+
+RATE_HZ = 30
+SIZES = {"": (640, 480), ".720p": (1280, 720)}
+_MEASURE_S = 12.0
+_START_S = 30.0
+_EYES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one run of a pair gave: CPU seconds per second and stream, frames lost, the nodes' own delay."""
+
+    cpu: float
+    lost: int
+    received: int
+    stamp_to_publish_ms: float
+    stamp_to_receive_ms: float
+
+
+def run(say: Callable[[str], None]) -> list[Row]:
+    """Measure both sizes, and the peer at each."""
+    rows = []
+    for suffix, size in SIZES.items():
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "webcam.avi"
+            mean_kb = record(file, size)
+            say(f"{size[0]}x{size[1]}: pictures of {mean_kb:.0f} kB on average")
+            ours = measure([_camera_node(eye, file, size) for eye in _EYES])
+            say(f"camera_node: {100 * ours.cpu:.1f} % of a core per stream, {ours.received} frames, {ours.lost} lost")
+            peer = measure([_transcoder(eye, file) for eye in _EYES])
+            say(f"decode and re-encode: {100 * peer.cpu:.1f} % of a core per stream, {peer.received} frames")
+        against = "decode and re-encode (OpenCV)"
+        rows += [
+            Row(f"camera.frames_lost{suffix}", ours.lost, "frames", against, peer.lost),
+            Row(f"camera.passthrough_cpu{suffix}", 100 * ours.cpu, "% of a core", against, 100 * peer.cpu),
+            Row(f"camera.passthrough_cpu_ratio{suffix}", ours.cpu / peer.cpu, "of the peer's"),
+            Row(f"camera.stamp_to_publish_ms{suffix}", ours.stamp_to_publish_ms, "ms"),
+            Row(f"camera.stamp_to_receive_ms{suffix}", ours.stamp_to_receive_ms, "ms"),
+        ]
+    return rows
+
+
+def record(path: Path, size_px: tuple[int, int], frames: int = 90) -> float:
+    """Write a Motion-JPEG AVI of a textured, moving scene with sensor noise; return the mean picture in kB."""
+    width, height = size_px
+    random = np.random.default_rng(0)
+    scene = random.integers(0, 256, (height // 8, width // 8 + 60, 3), dtype=np.uint8)
+    scene = cv2.resize(scene, None, fx=8, fy=8, interpolation=cv2.INTER_CUBIC)
+    writer = cv2.VideoWriter(str(path), cv2.CAP_OPENCV_MJPEG, cv2.VideoWriter.fourcc(*"MJPG"), RATE_HZ, size_px)
+    writer.set(cv2.VIDEOWRITER_PROP_QUALITY, 80)
+    for number in range(frames):
+        shift = 4 * number
+        picture: npt.NDArray[np.int16] = scene[:, shift : shift + width].astype(np.int16)
+        noise = random.normal(0.0, 3.0, picture.shape).astype(np.int16)
+        writer.write(np.clip(picture + noise, 0, 255).astype(np.uint8))
+    writer.release()
+    return path.stat().st_size / frames / 1e3
+
+
+def measure(commands: Sequence[Sequence[str]], duration_s: float = _MEASURE_S) -> Outcome:
+    """Run the commands as the two eyes, listen to both, and measure once both have settled."""
+    with own_domain() as domain, contextlib.ExitStack() as stack:
+        context = Context()
+        rclpy.init(args=[], context=context, domain_id=domain)
+        stack.callback(context.try_shutdown)
+        listener = Listener(context)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(listener)
+        processes = [stack.enter_context(_running(command, domain)) for command in commands]
+        _spin(executor, lambda: all(len(listener.stamps[eye]) > RATE_HZ for eye in _EYES), _START_S)
+        listener.clear()
+        before, began = [_cpu_s(process.pid) for process in processes], time.monotonic()
+        _spin(executor, lambda: time.monotonic() - began > duration_s, duration_s + 5.0)
+        elapsed = time.monotonic() - began
+        cpu = [(_cpu_s(p.pid) - b) / elapsed for p, b in zip(processes, before, strict=True)]
+        outcome = Outcome(
+            cpu=statistics.mean(cpu),
+            lost=sum(_missing(listener.stamps[eye]) for eye in _EYES),
+            received=sum(len(listener.stamps[eye]) for eye in _EYES),
+            stamp_to_publish_ms=max(listener.publish_ms.values(), default=float("nan")),
+            stamp_to_receive_ms=1e3 * statistics.median(listener.delays_s),
+        )
+        executor.shutdown()
+        listener.destroy_node()
+    return outcome
+
+
+class Listener(Node):
+    """The one subscriber of both streams."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__("bench_camera", context=context)
+        self.stamps: dict[str, list[int]] = {eye: [] for eye in _EYES}
+        self.delays_s: list[float] = []
+        self.publish_ms: dict[str, float] = {}
+        for eye in _EYES:
+            self.create_subscription(
+                CompressedImage, f"/{eye}/image_raw/compressed", lambda m, eye=eye: self._take(eye, m), IMAGE_QOS
+            )
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._take_diagnostics, 10)
+
+    def clear(self) -> None:
+        """Forget what came so far."""
+        for stamps in self.stamps.values():
+            stamps.clear()
+        self.delays_s.clear()
+        self.publish_ms.clear()
+
+    def _take(self, eye: str, message: CompressedImage) -> None:
+        stamp_ns = to_nanoseconds(message.header.stamp)
+        self.stamps[eye].append(stamp_ns)
+        self.delays_s.append((time.time_ns() - stamp_ns) * 1e-9)
+
+    def _take_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            for entry in status.values:
+                if entry.key == "stamp_to_publish_ms":
+                    self.publish_ms[status.name] = float(entry.value)
+
+
+def _missing(stamps_ns: Sequence[int]) -> int:
+    """Return how many frames are missing between the stamps of frames that were due at a fixed rate."""
+    period_ns = 1e9 / RATE_HZ
+    steps = [after - before for before, after in itertools.pairwise(stamps_ns)]
+    return sum(max(0, round(step / period_ns) - 1) for step in steps)
+
+
+def _camera_node(eye: str, file: Path, size: tuple[int, int]) -> list[str]:
+    parameters = {"device": str(file), "width_px": size[0], "height_px": size[1]}
+    return NodeCommand("vergence_camera", "camera_node", parameters, [f"__ns:=/{eye}"]).argv()
+
+
+def _transcoder(eye: str, file: Path) -> list[str]:
+    return [
+        *(sys.executable, "-m", "bench.camera_transcoder", str(file), str(RATE_HZ)),
+        *("--ros-args", "-r", f"__ns:=/{eye}"),
+    ]
+
+
+@contextlib.contextmanager
+def _running(command: Sequence[str], domain: int) -> "Iterator[subprocess.Popen[bytes]]":
+    env = environment({"ROS_DOMAIN_ID": str(domain)})
+    process = subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _cpu_s(pid: int) -> float:
+    """Return the CPU time of a process and all its threads so far."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _spin(executor: SingleThreadedExecutor, until: Callable[[], bool], timeout_s: float) -> None:
+    end_s = time.monotonic() + timeout_s
+    while not until():
+        if time.monotonic() > end_s:
+            raise TimeoutError(f"the streams did not come within {timeout_s:g} s")
+        executor.spin_once(timeout_sec=0.1)
