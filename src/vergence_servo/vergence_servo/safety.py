@@ -35,7 +35,8 @@ def safe_pulse_us(
         servo only get part of the way. A `last_us` outside the limits is brought back to them at once.
     """
     lowest, highest = grid_ends(limits, resolution_us)
-    last = _clamped(round(last_us / resolution_us) if math.isfinite(last_us) else lowest, lowest, highest)
+    inside_us = min(max(last_us, limits.minimum_us), limits.maximum_us) if math.isfinite(last_us) else limits.minimum_us
+    last = _clamped(round(inside_us / resolution_us), lowest, highest)
     if not math.isfinite(wanted_rad):
         return _on_limits(last, resolution_us, limits)
     calibration = limits.calibration

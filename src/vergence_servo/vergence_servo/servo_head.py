@@ -100,6 +100,8 @@ class ServoHead:
         self._trajectory: tuple[Trajectory, float] | None = None
         self._commanded_s = now_s
         self._next_start_s = now_s
+        for channel in self.channels.values():
+            channel.release(now_s)  # a process that was killed may have left it pulsing
 
     def set_parameters(self, parameters: HeadParameters) -> None:
         """Use other time-outs from now on."""

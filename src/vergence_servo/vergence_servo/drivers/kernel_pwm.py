@@ -64,14 +64,15 @@ class KernelPwmDriver:
         return pulse_ns / 1000
 
     def release(self, channel: int) -> None:
-        """See ServoDriver. The pulse in progress is finished: the width is set to nothing before the channel is cut."""
+        """See ServoDriver; also stops what a process that was killed has left pulsing."""
         folder = self._folder(channel)
         self._enabled.discard(channel)
         if not folder.is_dir():
             return
         try:
-            _write(folder / "duty_cycle", 0)
-            _write(folder / "enable", 0)
+            if (folder / "enable").read_text().strip() != "0":
+                _write(folder / "duty_cycle", 0)
+                _write(folder / "enable", 0)
         except OSError as error:
             raise _explained(error) from error
 
@@ -97,14 +98,17 @@ class KernelPwmDriver:
         deadline_s = time.monotonic() + _UDEV_PATIENCE_S
         while True:
             try:
-                _write(folder / "duty_cycle", 0)  # the kernel refuses a period below the present width
-                break
+                _write(folder / "period", self._period_ns)
+                return
             except (PermissionError, FileNotFoundError):
                 # udev hands a new channel to the group gpio a moment after it appears
                 if time.monotonic() > deadline_s:
                     raise
                 time.sleep(0.01)
-        _write(folder / "period", self._period_ns)
+            except OSError as error:
+                if error.errno != errno.EINVAL or time.monotonic() > deadline_s:
+                    raise
+                _write(folder / "duty_cycle", 0)  # another period's pulse was longer than this period
 
 
 def _find_chip(root: Path, number: int) -> Path:

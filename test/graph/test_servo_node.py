@@ -1,0 +1,277 @@
+"""servo_node as a real node over a fake sysfs tree: topics and services in, pulse widths out."""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from builtin_interfaces.msg import Duration
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSDurabilityPolicy, QoSProfile
+from rclpy.task import Future
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import SetBool, Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from vergence_common.stamps import to_stamp
+from vergence_rig.parameters import ParameterError
+from vergence_servo.drivers.protocol import DriverUnavailableError
+from vergence_servo.servo_node import ServoNode
+
+pytestmark = pytest.mark.graph
+
+WAIT_S = 15.0
+CONFIG = Path(__file__).parents[2] / "config"
+
+
+def make_chip(root: Path, channels: int = 4) -> Path:
+    """Make a PWM chip whose channels are exported already."""
+    chip = root / "pwmchip0"
+    for number in range(channels):
+        folder = chip / f"pwm{number}"
+        folder.mkdir(parents=True)
+        for name in ("duty_cycle", "period", "enable"):
+            (folder / name).write_text("0\n")
+    (chip / "npwm").write_text(f"{channels}\n")
+    return chip
+
+
+class Graph:
+    """servo_node and a client on one executor."""
+
+    def __init__(self, root: Path, **overrides: Any) -> None:
+        self.chip = make_chip(root)
+        self.context = Context()
+        rclpy.init(context=self.context)
+        values = {
+            "backend": "kernel_pwm",
+            "servos": str(CONFIG / "servos.yaml"),
+            "kernel_pwm.root": str(root),
+            "pose_file": str(root / "pose.json"),
+            "stagger_s": 0.0,
+            "guardian": False,
+        } | overrides
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
+        self.client = Node("client", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.client)
+        self.node: ServoNode | None = None
+        self.node = ServoNode(context=self.context, parameter_overrides=parameters)
+        self.executor.add_node(self.node)
+        self.states: list[JointState] = []
+        self.health: dict[str, DiagnosticStatus] = {}
+        self.client.create_subscription(JointState, "joint_states", self.states.append, 10)
+        self.client.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+        self.joint_command = self.client.create_publisher(JointState, "joint_command", 10)
+        self.until(lambda: "commands" in self.health and self.joint_command.get_subscription_count() == 1)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        self.health |= {status.name.split(": ")[1]: status for status in message.status}
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Spin until `condition` holds."""
+        done = Future(executor=self.executor)
+        watch = self.client.create_timer(0.005, lambda: done.set_result(True) if condition() else None)
+        self.executor.spin_until_future_complete(done, timeout_sec=WAIT_S)
+        self.client.destroy_timer(watch)
+        assert done.done(), "the condition never held"
+
+    def call(self, kind: Any, name: str, request: Any) -> Any:
+        """Call a service of the node."""
+        client = self.client.create_client(kind, f"servo_node/{name}")
+        assert client.wait_for_service(timeout_sec=WAIT_S)
+        future = client.call_async(request)
+        self.executor.spin_until_future_complete(future, timeout_sec=WAIT_S)
+        assert future.done()
+        return future.result()
+
+    def command(self, stamp_s: float | None = None, **positions_rad: float) -> None:
+        """Publish joint_command, stamped now unless told otherwise."""
+        message = JointState(name=list(positions_rad), position=list(positions_rad.values()))
+        message.header.stamp = to_stamp(time.time() if stamp_s is None else stamp_s)
+        self.joint_command.publish(message)
+
+    def duty_us(self, channel: int) -> float:
+        """The pulse that the kernel was told [us]; 0 if none."""
+        texts = [(self.chip / f"pwm{channel}" / name).read_text().split() for name in ("duty_cycle", "enable")]
+        return int(texts[0][0]) / 1000 if texts[0] and texts[1] == ["1"] else 0.0
+
+    def value(self, status: str, key: str) -> str:
+        """A figure from the diagnostics."""
+        return next((pair.value for pair in self.health[status].values if pair.key == key), "")
+
+    def close(self) -> None:
+        if self.node is not None:
+            self.node.close()
+            self.node.destroy_node()
+        self.client.destroy_node()
+        self.executor.shutdown()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def make_graph(tmp_path: Path, domain_id: int) -> Iterator[Callable[..., Graph]]:
+    made: list[Graph] = []
+
+    def make(**overrides: Any) -> Graph:
+        made.append(Graph(tmp_path, **overrides))
+        return made[-1]
+
+    yield make
+    for graph in made:
+        graph.close()
+
+
+def us(angle_rad: float) -> float:
+    """The pulse of an SG90 as shipped [us]."""
+    return 1500 + math.degrees(angle_rad) / 0.09
+
+
+def test_joint_command_by_name_reaches_the_pulses_and_joint_states(make_graph: Callable[..., Graph]):
+    graph = make_graph()
+    assert [graph.duty_us(channel) for channel in range(3)] == [0.0] * 3
+    graph.command(tilt=-0.2, pan_left=0.3)
+    graph.until(lambda: graph.duty_us(0) == pytest.approx(us(0.3), abs=0.03))
+    graph.until(lambda: graph.duty_us(2) == pytest.approx(us(-0.2), abs=0.03))
+    assert graph.duty_us(1) == 0.0
+    graph.until(lambda: graph.states[-1].position[0] == pytest.approx(0.3, abs=1e-3))
+    assert graph.states[-1].name == ["pan_left", "pan_right", "tilt"]
+
+
+def test_commands_in_the_order_of_the_joints(make_graph: Callable[..., Graph]):
+    graph = make_graph(joints=["tilt", "pan_right"], park_rad=[0.0, 0.0])
+    publisher = graph.client.create_publisher(Float64MultiArray, "servo_node/commands", 10)
+    graph.until(lambda: publisher.get_subscription_count() == 1)
+    publisher.publish(Float64MultiArray(data=[0.1, 0.2]))
+    graph.until(lambda: graph.duty_us(1) == pytest.approx(us(0.2), abs=0.03))
+    assert graph.duty_us(2) == pytest.approx(us(0.1), abs=0.03)
+    publisher.publish(Float64MultiArray(data=[0.1, 0.2, 0.3]))
+    graph.until(lambda: "refused ~/commands" in {pair.key for pair in graph.health["commands"].values})
+
+
+def test_a_trajectory_is_interpolated(make_graph: Callable[..., Graph]):
+    graph = make_graph(command_timeout_s=0.1)
+    publisher = graph.client.create_publisher(JointTrajectory, "joint_trajectory", 10)
+    graph.until(lambda: publisher.get_subscription_count() == 1)
+    point = JointTrajectoryPoint(positions=[0.5], time_from_start=Duration(sec=1))
+    publisher.publish(JointTrajectory(joint_names=["pan_left"], points=[point]))
+    seen: set[float] = set()
+    graph.until(lambda: seen.add(graph.duty_us(0)) or graph.duty_us(0) == pytest.approx(us(0.5), abs=0.03))
+    assert len([pulse for pulse in seen if us(0.05) < pulse < us(0.45)]) >= 10
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        ({"neck": 0.1}, "joint is 'neck'"),
+        ({"tilt": math.nan}, "nan"),
+        ({"tilt": 0.1, "stamp_s": 1.0}, "s old"),
+        ({"tilt": 0.1, "stamp_s": 2.1e9}, "ahead"),
+    ],
+)
+def test_refused_commands_move_nothing_and_say_why(
+    make_graph: Callable[..., Graph], command: dict[str, float], text: str
+):
+    graph = make_graph()
+    graph.command(**command)
+    graph.until(lambda: text in graph.value("commands", "last refusal"))
+    assert graph.health["commands"].level == DiagnosticStatus.WARN
+    assert graph.duty_us(2) == 0.0
+
+
+def test_silence_holds_then_releases_then_a_fresh_command_resumes(make_graph: Callable[..., Graph]):
+    graph = make_graph(command_timeout_s=0.1, release_timeout_s=0.5)
+    graph.command(pan_left=0.2)
+    graph.until(lambda: graph.duty_us(0) > 0)
+    graph.until(lambda: graph.duty_us(0) == 0)
+    graph.command(pan_left=0.1)
+    graph.until(lambda: graph.duty_us(0) == pytest.approx(us(0.1), abs=0.03))
+
+
+def test_enable_park_and_release(make_graph: Callable[..., Graph]):
+    graph = make_graph(enabled=False, park_rad=[0.1, 0.1, 0.1], park_speed_rad_s=20.0)
+    assert not graph.call(Trigger, "park", Trigger.Request()).success
+    assert graph.call(SetBool, "enable", SetBool.Request(data=True)).success
+    assert graph.call(Trigger, "park", Trigger.Request()).success
+    graph.until(lambda: all(graph.duty_us(i) == pytest.approx(us(0.1), abs=0.03) for i in range(3)))
+    assert graph.call(Trigger, "release", Trigger.Request()).success
+    assert [graph.duty_us(i) for i in range(3)] == [0.0] * 3
+
+
+def test_the_real_resolution_is_published_to_late_joiners(make_graph: Callable[..., Graph]):
+    graph = make_graph()
+    seen: list[JointState] = []
+    latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
+    graph.client.create_subscription(JointState, "servo_node/resolution", seen.append, latched)
+    graph.until(lambda: len(seen) == 1)
+    assert math.degrees(seen[0].position[0]) == pytest.approx(0.02 * 0.09)
+
+
+def test_a_failing_channel_is_reported_and_recovers(make_graph: Callable[..., Graph], tmp_path: Path):
+    graph = make_graph(retry_first_s=0.05, retry_longest_s=0.1)
+    graph.command(pan_left=0.2, tilt=0.2)
+    graph.until(lambda: graph.duty_us(0) == pytest.approx(us(0.2), abs=0.03))
+    (graph.chip / "pwm0").rename(tmp_path / "gone")
+    graph.command(pan_left=0.1, tilt=0.1)
+    graph.until(lambda: graph.health["servos"].level == DiagnosticStatus.ERROR)
+    assert "pan_left" in graph.health["servos"].message
+    assert "No such file" in graph.health["pan_left"].message
+    (tmp_path / "gone").rename(graph.chip / "pwm0")
+    graph.command(pan_left=0.1, tilt=0.1)
+    graph.until(lambda: graph.duty_us(0) == pytest.approx(us(0.1), abs=0.03))
+
+
+def test_two_commanders_are_reported(make_graph: Callable[..., Graph]):
+    graph = make_graph()
+    assert graph.health["commands"].level == DiagnosticStatus.OK
+    rival = Node("rival", context=graph.context)
+    rival.create_publisher(JointState, "joint_command", 10)
+    graph.until(lambda: graph.health["commands"].level == DiagnosticStatus.ERROR)
+    assert "/rival on joint_command" in graph.health["commands"].message
+    rival.destroy_node()
+    graph.until(lambda: graph.health["commands"].level == DiagnosticStatus.OK)
+
+
+def test_starting_at_the_last_pose(make_graph: Callable[..., Graph], tmp_path: Path):
+    (tmp_path / "pose.json").write_text('{"pan_left": 0.25, "tilt": 0.1, "nose": 3}')
+    graph = make_graph(start="last_pose")
+    graph.until(lambda: graph.duty_us(0) == pytest.approx(us(0.25), abs=0.03))
+
+
+def test_time_outs_change_while_running(make_graph: Callable[..., Graph]):
+    graph = make_graph(release_timeout_s=1000.0)
+    graph.command(pan_left=0.2)
+    graph.until(lambda: graph.duty_us(0) > 0)
+    assert graph.node is not None
+    result = graph.node.set_parameters_atomically(
+        [Parameter("release_timeout_s", value=0.2), Parameter("command_timeout_s", value=0.1)]
+    )
+    assert result.successful
+    graph.until(lambda: graph.duty_us(0) == 0)
+    assert not graph.node.set_parameters_atomically([Parameter("backend", value="fake")]).successful
+
+
+@pytest.mark.parametrize(
+    ("overrides", "kind", "text"),
+    [
+        ({"backend": "gpiozero"}, DriverUnavailableError, "11 positions"),
+        ({"backend": "kernel_pwm", "servos": ""}, ParameterError, "servos"),
+        ({"joints": ["neck"], "park_rad": [0.0]}, ValueError, "'neck' has no servo"),
+        ({"joints": ["tilt"]}, ParameterError, "park_rad"),
+        ({"speed": 1.0}, ParameterError, "no such name"),
+        ({"kernel_pwm.chip": 7}, DriverUnavailableError, "allowed is one of 0"),
+    ],
+)
+def test_configurations_that_cannot_be_end_the_node(
+    make_graph: Callable[..., Graph], overrides: dict[str, Any], kind: type[Exception], text: str
+):
+    with pytest.raises(kind, match=text):
+        make_graph(**overrides)
