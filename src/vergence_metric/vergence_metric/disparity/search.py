@@ -220,7 +220,10 @@ class _Search:
         if back is None:
             return math.inf
         reverse = correlate(right, left, at, sigma, back, (v - 1, v + 1), sign=1)
-        return abs(back[0] + int(reverse.profile.argmax()) - d) * float(scale)
+        k = int(reverse.profile.argmax())
+        there, again = surface.subpixel(i, j), reverse.subpixel(k, int(reverse.zncc[:, k].argmax()))
+        # Between the peaks proper: at half resolution an odd disparity lies half way between two columns.
+        return abs(again[0] - there[0]) * float(scale)
 
 
 def _peaks(profile: NDArray[np.float32]) -> NDArray[np.intp]:
