@@ -6,10 +6,12 @@ process. `.skewed`: the right eye is 11 ms later than the left one, as free-runn
 
 import json
 import os
+import select
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +21,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from bench.harness import Row
+from bench.harness import OUT_DIR, Row
 from vergence_bringup.processes import NodeCommand, ProcessGroup
 from vergence_common.domains import own_domain
 from vergence_common.qos import STATE_QOS
@@ -28,6 +30,7 @@ from vergence_msgs.msg import EdgeVergence
 
 PERIOD_NS = round(1e9 / 30)
 SKEW_NS = 11_000_000
+DISPARITY_PX = 12
 _PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 
 
@@ -66,75 +69,114 @@ def _percentile(outcome: Outcome, percent: float) -> float:
 def measure(skew_ns: int, seconds: float, shipped_profile: bool) -> Outcome:
     """Run the graph once."""
     with own_domain() as domain:
-        extra = {"ROS_DOMAIN_ID": str(domain)}
-        kept = {name: os.environ.pop(name) for name in (_PROFILE,) if not shipped_profile and name in os.environ}
-        try:
-            environment = os.environ | extra | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-            with ProcessGroup(extra_environment=extra if shipped_profile else extra | {_PROFILE: ""}) as nodes:
-                nodes.start("edge_metric_node", NodeCommand("vergence_metric", "edge_metric_node"))
-                return _run_eyes(domain, environment, skew_ns, seconds)
-        finally:
-            os.environ.update(kept)
+        environment = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        if not shipped_profile:
+            environment[_PROFILE] = ""
+        with ProcessGroup(OUT_DIR / "graph_logs", environment) as nodes:
+            nodes.start("edge_metric_node", NodeCommand("vergence_metric", "edge_metric_node"))
+            with _eyes(os.environ | environment, nodes) as eyes:
+                return _timed_run(eyes, domain, skew_ns, seconds)
 
 
-def _run_eyes(domain: int, environment: dict[str, str], skew_ns: int, seconds: float) -> Outcome:
-    context = Context()
-    rclpy.init(context=context, domain_id=domain)
-    node = Node("graph_bench", context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    arrived: dict[int, int] = {}
-    stages: dict[str, str] = {}
+class Eye:
+    """One `bench.eye_publisher` and the lines that go to and fro."""
 
-    def on_edge(message: EdgeVergence) -> None:
-        arrived[to_nanoseconds(message.header.stamp)] = time.monotonic_ns()
-
-    def on_diagnostics(message: DiagnosticArray) -> None:
-        for status in message.status:
-            if status.name == "edge_metric_node: measurement":
-                stages.update((pair.key, pair.value) for pair in status.values)
-
-    node.create_subscription(EdgeVergence, "vergence/edge", on_edge, STATE_QOS)
-    node.create_subscription(DiagnosticArray, "/diagnostics", on_diagnostics, 10)
-    eyes = [
-        subprocess.Popen(
+    def __init__(self, topic: str, shift_px: int, environment: dict[str, str]) -> None:
+        self._process = subprocess.Popen(
             [sys.executable, "-m", "bench.eye_publisher", topic, str(shift_px)],
             env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
-        for topic, shift_px in (("left/image_raw", 0), ("right/image_raw", 12))
-    ]
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._to, self._from = self._process.stdin, self._process.stdout
+
+    def is_ready(self) -> bool:
+        """Wait half a second at most for the eye to say that the node takes its images."""
+        if not select.select([self._from], [], [], 0.5)[0]:
+            return False
+        if self._from.readline().strip() != "ready":
+            raise RuntimeError(f"an eye ended with status {self._process.wait()}")
+        return True
+
+    def start(self, **timetable: int) -> None:
+        """Let it publish; see `bench.eye_publisher`."""
+        print(json.dumps(timetable), file=self._to, flush=True)
+
+    def published_ns(self) -> dict[int, int]:
+        """Return when each stamp was published, once all are, and let the eye end."""
+        sent = dict(json.loads(self._from.readline()))
+        print(file=self._to, flush=True)
+        return sent
+
+    def end(self) -> None:
+        """End it whatever it does."""
+        self._process.kill()
+        self._process.wait()
+
+
+@contextmanager
+def _eyes(environment: dict[str, str], nodes: ProcessGroup) -> Iterator[list[Eye]]:
+    """Start both eyes and wait until the node takes their images."""
+    eyes = [Eye("left/image_raw", 0, environment), Eye("right/image_raw", DISPARITY_PX, environment)]
     try:
         for eye in eyes:
-            assert eye.stdout is not None
-            if eye.stdout.readline().strip() != "ready":
-                raise RuntimeError(f"an eye ended with status {eye.wait()}")
-        count, start_ns = round(seconds * 30), time.monotonic_ns() + 1_000_000_000
-        for eye, offset_ns in zip(eyes, (0, skew_ns), strict=True):
-            timetable = {"start_ns": start_ns, "period_ns": PERIOD_NS, "offset_ns": offset_ns, "count": count}
-            _tell(eye, json.dumps(timetable))
-        end_ns = start_ns + count * PERIOD_NS + 1_000_000_000
-        while time.monotonic_ns() < end_ns:
-            executor.spin_once(timeout_sec=0.1)
-        sent = [dict(json.loads(eye.stdout.readline())) for eye in eyes if eye.stdout is not None]
-        for eye in eyes:
-            _tell(eye, "")
-            eye.wait(10)
+            while not eye.is_ready():
+                nodes.check()
+        yield eyes
     finally:
         for eye in eyes:
-            eye.kill()
-            eye.wait()
-        executor.shutdown()
-        node.destroy_node()
+            eye.end()
+
+
+def _timed_run(eyes: list[Eye], domain: int, skew_ns: int, seconds: float) -> Outcome:
+    count, start_ns = round(seconds * 30), time.monotonic_ns() + 1_500_000_000
+    with _receiver(domain) as receiver:
+        for eye, offset_ns in zip(eyes, (0, skew_ns), strict=True):
+            eye.start(start_ns=start_ns, period_ns=PERIOD_NS, offset_ns=offset_ns, count=count)
+        receiver.spin_until(start_ns + count * PERIOD_NS + 1_000_000_000)
+        left, right = (eye.published_ns() for eye in eyes)
+    later_ns = {stamp: max(published, right[stamp + skew_ns]) for stamp, published in left.items()}
+    latency = [receiver.arrived_ns[stamp] - later_ns[stamp] for stamp in later_ns if stamp in receiver.arrived_ns]
+    return Outcome(len(latency) / len(later_ns), np.array(latency) * 1e-6, receiver.stages)
+
+
+class Receiver:
+    """Takes down when each pair's `vergence/edge` arrives, and the node's own timings."""
+
+    def __init__(self, context: Context) -> None:
+        self.arrived_ns: dict[int, int] = {}
+        self.stages: dict[str, str] = {}
+        self.node = Node("graph_bench", context=context)
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.node)
+        self.node.create_subscription(EdgeVergence, "vergence/edge", self._on_edge, STATE_QOS)
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+
+    def _on_edge(self, message: EdgeVergence) -> None:
+        self.arrived_ns[to_nanoseconds(message.header.stamp)] = time.monotonic_ns()
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == "edge_metric_node: measurement":
+                self.stages.update((pair.key, pair.value) for pair in status.values)
+
+    def spin_until(self, end_ns: int) -> None:
+        """Receive until a monotonic time."""
+        while time.monotonic_ns() < end_ns:
+            self.executor.spin_once(timeout_sec=0.1)
+
+
+@contextmanager
+def _receiver(domain: int) -> Iterator[Receiver]:
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=domain)
+    receiver = Receiver(context)
+    try:
+        yield receiver
+    finally:
+        receiver.executor.shutdown()
+        receiver.node.destroy_node()
         context.try_shutdown()
-    later_ns = {stamp: max(published, sent[1][stamp + skew_ns]) for stamp, published in sent[0].items()}
-    latency = [arrived[stamp] - later_ns[stamp] for stamp in later_ns if stamp in arrived]
-    return Outcome(len(latency) / len(later_ns), np.array(latency) * 1e-6, stages)
-
-
-def _tell(eye: "subprocess.Popen[str]", line: str) -> None:
-    assert eye.stdin is not None
-    eye.stdin.write(line + "\n")
-    eye.stdin.flush()
