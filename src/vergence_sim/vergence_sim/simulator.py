@@ -56,7 +56,7 @@ class Simulator:
                 "the simulator renders both eyes with one focal length: left_camera and right_camera differ"
             )
         height, width = self.rig.left_camera.height_px, self.rig.left_camera.width_px
-        self._model = build_scene(self.rig, self.parameters, 2 * math.atan(0.5 * height / focal_px))
+        self._model = build_scene(self.rig, self.parameters, 2 * math.atan(0.5 * height / focal_px), textured=render)
         self._data = mujoco.MjData(self._model)
         self._truth = TruthTeller(self._model, self._data, self.lenses)
         self._renderer = EyeRenderer(self._model, width, height) if render else None
@@ -145,6 +145,14 @@ class Simulator:
     def truth(self) -> Truth:
         """Return the truth about the target now."""
         return self._truth.look(self.parameters.target, self.head.true_rad)
+
+    def project(self, eye: str, point_m: Sequence[float] | Array) -> tuple[float, float]:
+        """Return where an eye sees a point of rig_base (3,) [m], before its lens distorts it [px]; NaN behind it."""
+        return self._truth.project(eye, self._in_world(np.asarray(point_m, np.float64)))
+
+    def errors_to(self, point_m: Sequence[float] | Array) -> tuple[float, float, float]:
+        """Return how much vergence, version and tilt are short of a point of rig_base (3,) [m], in radians."""
+        return self._truth.axis_errors(self._in_world(np.asarray(point_m, np.float64)))
 
     def true_boxes(self, eye: str) -> list[TrueBox]:
         """Return the true boxes of all targets in one eye's image."""

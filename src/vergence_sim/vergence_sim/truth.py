@@ -14,6 +14,8 @@ Array = npt.NDArray[np.float64]
 
 _GRID = 6
 _SAME_SURFACE_M = 1e-3
+# What the head itself is made of hides nothing from its own eyes.
+_SEEN_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class TruthTeller:
         point = self.target_point_world(target)
         local = np.array(base.xmat).reshape(3, 3).T @ (point - np.array(base.xpos))
         errors = {eye: self._eye_error(eye, point) for eye in ("left", "right")}
-        vergence_error, version_error, elevation_error = self._axis_errors(point)
+        vergence_error, version_error, elevation_error = self.axis_errors(point)
         samples, shares = self._samples(target)
         return Truth(
             target=target,
@@ -144,7 +146,7 @@ class TruthTeller:
         ray = point - np.array(body.xpos)
         return math.acos(max(-1.0, min(1.0, float(axis @ ray) / float(np.linalg.norm(ray)))))
 
-    def _axis_errors(self, point: Array) -> tuple[float, float, float]:
+    def axis_errors(self, point: Array) -> tuple[float, float, float]:
         """Return how much vergence, version and tilt are short of the target [rad], in the tilt bar's own axes."""
         bar = self._data.body("tilt_bar")
         rotation = np.array(bar.xmat).reshape(3, 3)
@@ -221,7 +223,7 @@ class TruthTeller:
         origin = np.array(self._data.camera(eye).xpos)
         direction = point - origin
         length = float(np.linalg.norm(direction))
-        nearest = mujoco.mj_ray(self._model, self._data, origin, direction / length, None, True, -1, self._hit)
+        nearest = mujoco.mj_ray(self._model, self._data, origin, direction / length, _SEEN_GROUPS, True, -1, self._hit)
         return nearest < 0 or nearest > length - _SAME_SURFACE_M
 
     def _mean_disparity(self, samples: list[Array]) -> float:
