@@ -1,13 +1,14 @@
-"""Procedural textures: rich, multi-scale, never repeating, the same for the same seed."""
+"""Clutter for pictures and for training a detector: collages of shapes and letters, faces of cubes."""
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-Image = npt.NDArray[np.uint8]
+from vergence_sim.pictures import CUBE_COLOURS_BGR, stickers
 
-CUBE_COLOURS_BGR = ((246, 246, 240), (30, 210, 250), (40, 40, 200), (20, 120, 250), (160, 80, 20), (70, 150, 20))
-"""White, yellow, red, orange, blue, green: a Rubik's cube's stickers."""
+__all__ = ["CUBE_COLOURS_BGR", "cloud", "collage", "cube_face", "painted"]
+
+Image = npt.NDArray[np.uint8]
 
 
 def cloud(rng: np.random.Generator, size_px: int, octaves: int = 6, roughness: float = 0.62) -> npt.NDArray[np.float32]:
@@ -25,14 +26,6 @@ def painted(rng: np.random.Generator, size_px: int, base_bgr: tuple[int, ...], c
     shade = cloud(rng, size_px)[:, :, None] * contrast
     tint = np.stack([cloud(rng, size_px, 4) for _ in range(3)], axis=2) * 0.35 * contrast
     return np.clip(np.array(base_bgr, np.float32) + shade + tint, 0, 255).astype(np.uint8)
-
-
-def wooden(rng: np.random.Generator, size_px: int, base_bgr: tuple[int, int, int] = (60, 105, 160)) -> Image:
-    """Return (n, n, 3) of wood: bent grain, knots and pores."""
-    y, x = np.mgrid[0:size_px, 0:size_px].astype(np.float32) / size_px
-    bend = cloud(rng, size_px, 4) * 0.05
-    grain = np.sin((x + bend) * 70 + cloud(rng, size_px, 3) * 2.5) * 14 + cloud(rng, size_px, 7, 0.8) * 12
-    return np.clip(np.array(base_bgr, np.float32) + grain[:, :, None] + y[:, :, None] * 6, 0, 255).astype(np.uint8)
 
 
 def collage(rng: np.random.Generator, size_px: int, pieces: int = 90, plain: float = 0.2) -> Image:
@@ -62,19 +55,5 @@ def collage(rng: np.random.Generator, size_px: int, pieces: int = 90, plain: flo
 
 
 def cube_face(rng: np.random.Generator, size_px: int = 192) -> Image:
-    """Return (n, n, 3) of one face of a scrambled Rubik's cube: nine stickers with black gaps, a little worn."""
-    face = np.full((size_px, size_px, 3), 18, np.uint8)
-    cell = size_px // 3
-    gap = max(2, cell // 12)
-    for row in range(3):
-        for column in range(3):
-            colour = CUBE_COLOURS_BGR[rng.integers(0, 6)]
-            cv2.rectangle(
-                face,
-                (column * cell + gap, row * cell + gap),
-                ((column + 1) * cell - gap - 1, (row + 1) * cell - gap - 1),
-                colour,
-                -1,
-            )
-    worn = cloud(rng, size_px, 6, 0.8)[:, :, None] * 6
-    return np.clip(face + worn, 0, 255).astype(np.uint8)
+    """Return (n, n, 3) of one face of a Rubik's cube with any colours on its nine stickers."""
+    return stickers(rng, [CUBE_COLOURS_BGR[int(c)] for c in rng.integers(0, 6, 9)], 3, size_px)

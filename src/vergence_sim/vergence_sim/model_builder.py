@@ -1,0 +1,100 @@
+"""Writes a MuJoCo model: named textures and shapes in, a compiled model out."""
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence_sim.surfaces import Image
+
+FACES = ("right", "left", "up", "down", "front", "back")
+"""Of MuJoCo's cube textures, in the order of `ModelBuilder.wrap`: what looks along +x, -x, +y, -y, +z, -z."""
+
+# Seen from outside with z up, MuJoCo puts the pictures of the first three on their sides or upside down.
+_UPRIGHT = {"right": cv2.ROTATE_90_COUNTERCLOCKWISE, "left": cv2.ROTATE_90_CLOCKWISE, "up": cv2.ROTATE_180}
+_VISIBLE = 0
+HIDDEN_GROUP = 3
+"""Geometry of this group is seen by nobody but an onlooker: the head itself."""
+
+
+class ModelBuilder:
+    """Collects textures and shapes. Without `textured` shapes stay grey, which compiles in milliseconds."""
+
+    def __init__(self, textured: bool) -> None:
+        self.textured = textured
+        self._files: dict[str, bytes] = {}
+        self._assets: list[str] = []
+        self._bodies: list[str] = []
+        self._shapes = 0
+
+    def flat(self, name: str, image: Image) -> str:
+        """Add a texture for planes, stretched over each once; returns its name."""
+        self._assets.append(f'<texture name="{name}" type="2d" file="{self._file(name, image)}"/>')
+        self._assets.append(f'<material name="{name}" texture="{name}" texrepeat="1 1" specular="0.02"/>')
+        return name
+
+    def wrap(self, name: str, images: list[Image], specular: float = 0.1) -> str:
+        """Add a texture around a box, cylinder or ellipsoid: six square images as in FACES, upright from outside."""
+        turned = [
+            np.asarray(cv2.rotate(image, _UPRIGHT[face]), np.uint8) if face in _UPRIGHT else image
+            for face, image in zip(FACES, images, strict=True)
+        ]
+        files = " ".join(
+            f'file{face}="{self._file(f"{name}_{face}", image)}"' for face, image in zip(FACES, turned, strict=True)
+        )
+        self._assets.append(f'<texture name="{name}" type="cube" {files}/>')
+        self._assets.append(f'<material name="{name}" texture="{name}" specular="{specular}"/>')
+        return name
+
+    def shape(
+        self,
+        kind: str,
+        centre_m: tuple[float, float, float],
+        size_m: tuple[float, ...],
+        material: str | tuple[float, float, float],
+        turn_rad: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        name: str = "",
+        group: int = _VISIBLE,
+    ) -> str:
+        """Return a geom: MuJoCo's kind and half sizes, a texture's name or a colour RGB, Euler angles x y z."""
+        self._shapes += 1
+        if isinstance(material, str):
+            look = f'material="{material}"' if self.textured else 'rgba="0.5 0.5 0.5 1"'
+        else:
+            look = f'rgba="{_text(material)} 1"'
+        return (
+            f'<geom name="{name or f"shape{self._shapes}"}" type="{kind}" pos="{_text(centre_m)}"'
+            f' size="{_text(size_m)}" euler="{_text(turn_rad)}" group="{group}" {look}/>'
+        )
+
+    def add(self, *elements: str) -> None:
+        """Put shapes or bodies into the world."""
+        self._bodies += elements
+
+    def movable(self, name: str, *shapes: str) -> None:
+        """Put a body into the world that goes where it is put; it starts below the floor."""
+        self._bodies.append(f'<body name="{name}" mocap="true" pos="0 0 -5">{"".join(shapes)}</body>')
+
+    def compiled(self, size_px: tuple[int, int], samples: int, headlight: str, lights: str) -> mujoco.MjModel:
+        """Return the model. `size_px` is (width, height) of its views; `headlight` and `lights` are MJCF."""
+        xml = f"""<mujoco model="room"><compiler angle="radian"/>
+        <visual>
+          <global offwidth="{size_px[0]}" offheight="{size_px[1]}"/>
+          <quality offsamples="{samples}" shadowsize="0" numslices="14" numstacks="8" numquads="2"/>
+          <map znear="0.002" zfar="20"/>
+          {headlight}
+        </visual>
+        <statistic extent="1" center="0 0 1"/>
+        <asset>{"".join(self._assets) if self.textured else ""}</asset>
+        <worldbody>{lights}{"".join(self._bodies)}</worldbody></mujoco>"""
+        return mujoco.MjModel.from_xml_string(xml, self._files)
+
+    def _file(self, name: str, image: Image) -> str:
+        if self.textured:
+            # Uncompressed: MuJoCo unpacks it a moment later.
+            self._files[f"{name}.png"] = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 0])[1].tobytes()
+        return f"{name}.png"
+
+
+def _text(values: tuple[float, ...] | NDArray[np.float64]) -> str:
+    return " ".join(f"{value:.5f}" for value in values)
