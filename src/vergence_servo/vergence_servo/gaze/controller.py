@@ -294,13 +294,24 @@ class GazeController:
             now_s=view.now_s,
             active=self._active,
             has_target=has_target,
-            unseen_s=view.now_s - tracking.seen_s if math.isfinite(tracking.seen_s) else math.inf,
+            unseen_s=self._unseen_s(view.now_s),
             residual_rad=float(np.abs(residual).max()),
             eyes_still=self._eyes_still(view.now_s, view.commanded_rad),
             travel_s=float((np.abs(residual) / view.speed_rad_s).max()),
             verged=self._judge.verged,
             may_search=tracking.class_name is not None or tracking.takes_stream or lost_s > self._p.search_after_s,
         )
+
+    def _unseen_s(self, now_s: float) -> float:
+        """Return for how long images came in which the target was not seen; inf before it ever was.
+
+        While no image results come at all there is nothing to be lost in: a starved graph is late, not blind.
+        """
+        seen_s = self._tracking.seen_s
+        if not math.isfinite(seen_s):
+            return math.inf
+        images_come = now_s - self._image_s < self._p.no_images_s
+        return max(0.0, (self._image_s if images_come else now_s) - seen_s)
 
     def _eyes_still(self, now_s: float, command: Array) -> bool:
         slow = self._history.speed_within(self._history.newest_s - 0.015, now_s) < _STILL_SPEED_RAD_S
