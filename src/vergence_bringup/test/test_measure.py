@@ -9,6 +9,7 @@ import pytest
 
 from vergence_bringup.command_line import main
 
+EYES = ("left", "right")
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "stereo_chessboard"
 
 
@@ -21,7 +22,7 @@ def brute_force(from_mask, to_mask):
 
 
 def check(figures, out):
-    left, right = (cv2.imread(str(out / f"{eye}_edges.png"), cv2.IMREAD_GRAYSCALE) for eye in ("left", "right"))
+    left, right = (np.asarray(cv2.imread(str(out / f"{eye}_edges.png"), cv2.IMREAD_GRAYSCALE)) for eye in EYES)
     h, w = left.shape
     for i, size in enumerate(figures["windows_px"]):
         rows = slice(h // 2 - size // 2, h // 2 - size // 2 + size)

@@ -1,6 +1,7 @@
 """`vergence demo`: every node as its own process, the simulated head, and a report of what it did."""
 
 import argparse
+import contextlib
 import math
 import os
 import signal
@@ -16,6 +17,7 @@ from vergence_bringup.demo_report import write_report
 from vergence_bringup.demo_result import StationResult, table, write_summary
 from vergence_bringup.demo_stations import Station, stations
 from vergence_bringup.processes import NodeCommand, ProcessGroup, config_dir, environment
+from vergence_common.domains import own_domain
 from vergence_rig.rig import Rig, load_rig
 
 SERVOS = ("sg90", "mg995", "ideal")
@@ -43,6 +45,15 @@ def run(options: argparse.Namespace) -> int:
 
     signal.signal(signal.SIGTERM, _interrupt)
     os.environ.update(environment())
+    with contextlib.ExitStack() as stack:
+        if "ROS_DOMAIN_ID" not in os.environ:
+            # Another head on this machine must not be heard here, nor hear this one.
+            os.environ["ROS_DOMAIN_ID"] = str(stack.enter_context(own_domain()))
+            _say(f"to look on from another shell: source env.sh; export ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
+        return _run(options, rig, chosen)
+
+
+def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station]) -> int:
     started = time.monotonic()
     results: list[StationResult] = []
     _say(f"starting sim_node, edge_metric_node and gaze_controller_node (logs in {options.out / 'log'})")
