@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vergence_metric.nearest_edges import NearestEdges
 from vergence_metric.windows import Window
 
-_LATTICE = 24  # points along a window's side: the mean is within 1 % of that over every pixel
+_LATTICE = 20  # points along a window's side: the mean is within 2 % of that over every pixel
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class ChanceLevels:
 def chance_levels(field: NearestEdges) -> ChanceLevels:
     """Return the mean distance from the window's pixels to the nearest edge pixel, in every window both ways.
 
-    The mean is taken over a lattice of at most 24 by 24 pixels that lie evenly in the window.
+    The mean is taken over a lattice of at most 20 by 20 pixels that lie evenly in the window.
     """
     n = len(field.windows)
     lattices = [_lattice(window) for window in field.windows]

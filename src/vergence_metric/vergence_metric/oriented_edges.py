@@ -10,8 +10,9 @@ Each plane is the one before with a few shifted copies of the edges laid over it
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,18 +47,33 @@ class OrientedField:
     bins: int
     truncation_px: int
     images: tuple[OrientedEdges, OrientedEdges]
+    _known: dict[tuple[object, ...], NDArray[Any]] = field(default_factory=dict, repr=False, compare=False)
 
     def distances_px(self, direction: int, truncation_px: int) -> NDArray[np.float32]:
         """Return the truncated distance of each edge pixel of image `direction` to the other's of its bin, (n,)."""
-        edges, planes = self.images[direction], self.images[1 - direction].planes
-        steps = radius_steps(truncation_px)
-        near = np.take(planes[: len(steps)], edges.at, axis=1)
-        near >>= edges.bin
-        near &= 1
-        return np.float32(truncation_px) - steps @ near.astype(np.float32)
+        key = ("at edges", direction, truncation_px)
+        if key not in self._known:
+            edges, planes = self.images[direction], self.images[1 - direction].planes
+            steps = radius_steps(truncation_px)
+            near = np.take(planes[: len(steps)], edges.at, axis=1)
+            near >>= edges.bin
+            near &= 1
+            self._known[key] = np.float32(truncation_px) - steps @ near.astype(np.float32)
+        return self._known[key]
 
     def mean_distances_px(self, image: int, truncation_px: int, points_per_side: int) -> NDArray[np.float64]:
         """Return the mean truncated distance to the edges of `image`, (windows, bins), over a lattice of pixels."""
+        key = ("everywhere", image, truncation_px, points_per_side)
+        if key not in self._known:
+            self._known[key] = self._mean_distances(image, truncation_px, points_per_side)
+        return self._known[key]
+
+    def fovea_weights(self, image: int, sigma_px: float) -> NDArray[np.float64]:
+        """Return a Gaussian weight of each edge pixel of `image` about the windows' centre, (n,)."""
+        edges, window = self.images[image], self.windows[-1]
+        return _gaussian(window.height, sigma_px)[edges.row] * _gaussian(window.width, sigma_px)[edges.column]
+
+    def _mean_distances(self, image: int, truncation_px: int, points_per_side: int) -> NDArray[np.float64]:
         inner, planes = self.windows[-1], self.images[image].planes
         steps = radius_steps(truncation_px).astype(np.float64)
         stride = inner.width + 2 * self.truncation_px
@@ -71,11 +87,6 @@ class OrientedField:
             counts = _SPREAD[near].sum(axis=1).view(np.uint8).reshape(len(steps), -1, MOST_BINS).sum(axis=1)
             means[i] = truncation_px - steps @ counts[:, : self.bins] / (len(row) * len(column))
         return means
-
-    def fovea_weights(self, image: int, sigma_px: float) -> NDArray[np.float64]:
-        """Return a Gaussian weight of each edge pixel of `image` about the windows' centre, (n,)."""
-        edges, window = self.images[image], self.windows[-1]
-        return _gaussian(window.height, sigma_px)[edges.row] * _gaussian(window.width, sigma_px)[edges.column]
 
 
 _SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").view(np.uint64).ravel()
@@ -166,7 +177,7 @@ def _rings(spans: list[tuple[int, int]], length: int, margin: int) -> NDArray[np
 
 def _planes(base: NDArray[np.uint8], stride: int, truncation: int) -> NDArray[np.uint8]:
     """Return the planes of all radii below the cut-off; rows are laid end to end, the outer margin is not valid."""
-    planes = np.zeros((len(_offsets(truncation)), base.size), np.uint8)
+    planes = np.empty((len(_offsets(truncation)), base.size), np.uint8)
     margin = (truncation - 1) * stride + truncation
     inner = slice(margin, base.size - margin)
     aside = [base]  # base shifted by dx to both sides
