@@ -1,0 +1,100 @@
+"""What a detector saw in one image."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_BORDER_PX = 1.5
+
+
+@dataclass(frozen=True)
+class Box:
+    """One object's box in raw image pixels: origin at the centre of the top-left pixel, x right, y down.
+
+    `xyxy_px` are the box's outer sides, so that a box of one pixel is one wide. `cut` tells for (left, top, right,
+    bottom) which sides touch the image's border: those are not the object's.
+    """
+
+    xyxy_px: tuple[float, float, float, float]
+    score: float
+    class_id: int
+    class_name: str
+    cut: tuple[bool, bool, bool, bool] = (False, False, False, False)
+
+    @property
+    def center_px(self) -> tuple[float, float]:
+        """The box's centre (x, y)."""
+        x_min, y_min, x_max, y_max = self.xyxy_px
+        return 0.5 * (x_min + x_max), 0.5 * (y_min + y_max)
+
+    @property
+    def size_px(self) -> tuple[float, float]:
+        """Width and height."""
+        x_min, y_min, x_max, y_max = self.xyxy_px
+        return x_max - x_min, y_max - y_min
+
+    @property
+    def is_cut(self) -> bool:
+        """True if any side touches the image's border."""
+        return any(self.cut)
+
+
+@dataclass(frozen=True)
+class Detections:
+    """Every object of one image, best score first: `xyxy_px` (N, 4), `scores` (N,), `class_ids` (N,)."""
+
+    xyxy_px: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    class_ids: NDArray[np.int64]
+    class_names: tuple[str, ...]
+    image_size_px: tuple[int, int]
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+    def __iter__(self) -> Iterator[Box]:
+        return iter(self.boxes())
+
+    def boxes(self) -> list[Box]:
+        """Return each object on its own."""
+        cuts = cut_sides(self.xyxy_px, self.image_size_px)
+        return [
+            Box(
+                (float(box[0]), float(box[1]), float(box[2]), float(box[3])),
+                float(score),
+                int(class_id),
+                name,
+                (bool(cut[0]), bool(cut[1]), bool(cut[2]), bool(cut[3])),
+            )
+            for box, score, class_id, name, cut in zip(
+                self.xyxy_px, self.scores, self.class_ids, self.class_names, cuts, strict=True
+            )
+        ]
+
+
+def make_detections(
+    xyxy_px: NDArray[np.float64],
+    scores: NDArray[np.float64],
+    class_ids: NDArray[np.int64],
+    names: Sequence[str],
+    image_size_px: tuple[int, int],
+) -> Detections:
+    """Sort by score, clip to the image (width, height) and name the classes; a class without a name is its number."""
+    width, height = image_size_px
+    order = np.argsort(-scores, kind="stable")
+    # The outermost pixels reach half a pixel beyond their centres.
+    clipped = np.clip(xyxy_px[order], -0.5, [width - 0.5, height - 0.5, width - 0.5, height - 0.5])
+    ids = class_ids[order]
+    labels = tuple(names[i] if 0 <= i < len(names) else str(int(i)) for i in ids)
+    return Detections(clipped.reshape(-1, 4), scores[order], ids, labels, image_size_px)
+
+
+def cut_sides(xyxy_px: NDArray[np.float64], image_size_px: tuple[int, int]) -> NDArray[np.bool_]:
+    """Tell for boxes (N, 4) which of their sides (left, top, right, bottom) lie at the image's border."""
+    width, height = image_size_px
+    low, high = -0.5 + _BORDER_PX, (width - 0.5 - _BORDER_PX, height - 0.5 - _BORDER_PX)
+    return np.column_stack(
+        [xyxy_px[:, 0] <= low, xyxy_px[:, 1] <= low, xyxy_px[:, 2] >= high[0], xyxy_px[:, 3] >= high[1]]
+    )

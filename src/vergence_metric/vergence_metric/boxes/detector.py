@@ -1,0 +1,138 @@
+"""Any YOLO as an ONNX file, made to answer alike: `detect` gives boxes in raw pixels of the image."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence_metric.box_parameters import DetectorParameters
+from vergence_metric.boxes.decoding import decode
+from vergence_metric.boxes.detections import Detections, make_detections
+from vergence_metric.boxes.errors import DetectorImageError, ModelClassError
+from vergence_metric.boxes.layouts import find_layout
+from vergence_metric.boxes.letterbox import Letterbox, blob
+from vergence_metric.boxes.session import ModelSession
+from vergence_metric.boxes.suppression import suppress
+
+_DEFAULT_SIZE_PX = (640, 640)
+_GREY = 114
+
+
+@dataclass(frozen=True)
+class Preprocessing:
+    """How an image becomes the input; see DetectorParameters."""
+
+    color: str
+    unit_scale: bool
+    resize: str
+
+
+class Detector:
+    """A loaded detector. Loading runs it once, so that the first image is not late and its layout is known."""
+
+    def __init__(self, parameters: DetectorParameters, threads: int = 1) -> None:
+        """Load the model that the parameters name.
+
+        Raises:
+            ModelFileError, ModelLayoutError, ModelClassError, DetectorError: one clear line each.
+
+        """
+        self._session = ModelSession(parameters.model, parameters.device, threads)
+        self.input_px = _input_size(self._session, parameters)
+        names = self._session.class_names()
+        picture = np.full((self.input_px[1], self.input_px[0], 3), _GREY, np.uint8)
+        # Range and order of the channels do not change the outputs' shapes.
+        outputs = self._session.run(blob(picture, "rgb", True, self._session.input.dtype))
+        self.layout = find_layout(
+            self._session.output_names,
+            outputs,
+            self.input_px,
+            self._session.metadata,
+            parameters.layout,
+            len(names) or None,
+        )
+        self.preprocessing = _preprocessing(parameters, self.layout.name, self._session.input.dtype)
+        self.class_names = names or tuple(str(i) for i in range(self.layout.classes or 0))
+        self._letterboxes: dict[tuple[int, int], Letterbox] = {}
+        self.set_parameters(parameters)
+
+    @property
+    def path(self) -> Path:
+        """The model's file."""
+        return self._session.path
+
+    def describe(self) -> str:
+        """Return one line on what was loaded."""
+        how = self.preprocessing
+        width, height = self.input_px
+        return (
+            f"{self.path.name}: {self.layout}, input {width}x{height} {how.color} "
+            f"{'0..1' if how.unit_scale else '0..255'} by {how.resize}"
+        )
+
+    def set_parameters(self, parameters: DetectorParameters) -> None:
+        """Take changed thresholds and classes; raises ModelClassError for classes the model does not have."""
+        self._wanted = _class_ids(parameters.classes, self.class_names)
+        self._parameters = parameters
+
+    def detect(self, image: NDArray[Any]) -> Detections:
+        """Return the objects in an image (h, w, 3) BGR or (h, w) grey uint8; raises DetectorImageError for others."""
+        outputs = self._session.run(self._tensor(image))
+        p, size = self._parameters, (image.shape[1], image.shape[0])
+        raw = decode(self.layout, outputs, self.input_px, p.threshold)
+        chosen = np.arange(len(raw.scores))
+        if self._wanted is not None:
+            chosen = chosen[np.isin(raw.class_ids, self._wanted)]
+        if not self.layout.suppressed:
+            chosen = chosen[suppress(raw.xyxy[chosen], raw.scores[chosen], raw.class_ids[chosen], p.iou, p.max_det)]
+        else:
+            chosen = chosen[np.argsort(-raw.scores[chosen], kind="stable")][: p.max_det]
+        boxes = self._letterboxes[size].to_source(raw.xyxy[chosen])
+        return make_detections(boxes, raw.scores[chosen], raw.class_ids[chosen], self.class_names, size)
+
+    def _tensor(self, image: NDArray[Any]) -> NDArray[Any]:
+        if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in ((), (3,)) or not image.size:
+            raise DetectorImageError(
+                f"image is {image.dtype} {image.shape}: allowed is uint8 (h, w, 3) or (h, w), not empty"
+            )
+        colour = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)) if image.ndim == 2 else image
+        size = (image.shape[1], image.shape[0])
+        if size not in self._letterboxes:
+            self._letterboxes = {size: Letterbox.fit(size, self.input_px, self.preprocessing.resize)}
+        how = self.preprocessing
+        return blob(self._letterboxes[size].place(colour), how.color, how.unit_scale, self._session.input.dtype)
+
+
+def _input_size(session: ModelSession, parameters: DetectorParameters) -> tuple[int, int]:
+    wanted = (parameters.imgsz_width, parameters.imgsz_height)
+    if 0 in wanted:
+        wanted = session.own_size_px() or _DEFAULT_SIZE_PX
+    stride = session.stride_px()
+    # A dynamic input must still be whole strides, or the network's own maps do not fit each other.
+    width, height = (-(-side // stride) * stride for side in wanted)
+    return session.input.width_px or width, session.input.height_px or height
+
+
+def _preprocessing(parameters: DetectorParameters, layout: str, dtype: Any) -> Preprocessing:
+    raw = layout == "yolox"
+    color = parameters.color if parameters.color != "auto" else ("bgr" if raw else "rgb")
+    resize = parameters.resize if parameters.resize != "auto" else ("corner" if raw else "letterbox")
+    scale = parameters.scale if parameters.scale != "auto" else ("byte" if raw or dtype == np.uint8 else "unit")
+    return Preprocessing(color, scale == "unit", resize)
+
+
+def _class_ids(wanted: tuple[str, ...], names: tuple[str, ...]) -> NDArray[np.int64] | None:
+    if not wanted:
+        return None
+    ids = []
+    for word in wanted:
+        if word in names:
+            ids.append(names.index(word))
+        elif word.isdigit() and (not names or int(word) < len(names)):
+            ids.append(int(word))
+        else:
+            raise ModelClassError(f"class is {word!r}: the model has {', '.join(names) or 'numbers only'}")
+    return np.array(ids, np.int64)

@@ -1,0 +1,266 @@
+"""Metric II of pair after pair: detect, pair, choose the target, measure, refine, smooth, place in space."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence_metric.box_parameters import BoxMetricNodeParameters
+from vergence_metric.boxes.association import Association, BoxPair, associate
+from vergence_metric.boxes.corner_metric import corner_metric, hidden_sides
+from vergence_metric.boxes.detections import Box, Detections
+from vergence_metric.boxes.detector import Detector
+from vergence_metric.boxes.errors import DetectorImageError
+from vergence_metric.boxes.following import Choice, TargetMemory
+from vergence_metric.boxes.pair_geometry import PairGeometry
+from vergence_metric.boxes.refinement import refine
+from vergence_metric.boxes.result import NAN2, UNREFINED, BoxStatus, BoxVergenceResult
+from vergence_metric.boxes.smoothing import LagLimitedFilter
+from vergence_metric.boxes.target_point import TargetPoint, locate
+from vergence_metric.boxes.uncertainty import center_sigma_px, disparity_sigma_px
+from vergence_metric.viewing_angles import angular_disparity
+from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import EyeAngles
+
+Models = tuple[CameraModel, CameraModel]
+
+JOINT_SIGMA_RAD = 0.004
+"""Of one joint without feedback: a dead band of 0.75 degree, evenly spread."""
+
+_VERTICAL_WEIGHT = 0.05
+_LARGEST_VERTICAL_PX = 40.0
+
+
+class BoxMeasurement:
+    """Measures pairs in order of their stamps; remembers the target and the mounts' vertical offset."""
+
+    def __init__(
+        self, parameters: BoxMetricNodeParameters, baseline_m: float, detector: Detector | None = None
+    ) -> None:
+        """Load the detector that the parameters name, unless one is given; raises its errors."""
+        self.detector = detector or Detector(parameters, parameters.threads)
+        self._baseline_m = baseline_m
+        self._memory = TargetMemory(parameters)
+        self._vertical_px, self._vertical_count = 0.0, 0
+        self._parameters = parameters
+        self._filter = LagLimitedFilter(parameters.smoothing_lag_s)
+
+    def set_parameters(self, parameters: BoxMetricNodeParameters) -> None:
+        """Take changed parameters; raises ModelClassError for classes the model does not have."""
+        if parameters == self._parameters:
+            return
+        self.detector.set_parameters(parameters)
+        self._memory.parameters = parameters
+        if parameters.smoothing_lag_s != self._parameters.smoothing_lag_s:
+            self._filter = LagLimitedFilter(parameters.smoothing_lag_s)
+        self._parameters = parameters
+
+    def measure(
+        self,
+        left: NDArray[Any],
+        right: NDArray[Any],
+        stamp_s: float = 0.0,
+        eyes: EyeAngles | None = None,
+        models: Models | None = None,
+    ) -> BoxVergenceResult:
+        """Return metric II of a pair.
+
+        Args:
+            left: (h, w, 3) BGR or (h, w) grey uint8 of the left eye.
+            right: of the right eye, of the same size.
+            stamp_s: of the left image; a stamp that goes back forgets the target.
+            eyes: joint angles at the images' stamps, None if they are not known.
+            models: both cameras, None if they are not known.
+
+        Raises:
+            DetectorImageError: images that are not of one size, or no images.
+
+        """
+        if left.shape[:2] != right.shape[:2]:
+            raise DetectorImageError(f"right image is {right.shape[:2]}: allowed is the left one's {left.shape[:2]}")
+        return self.relate(
+            (left, right), (self.detector.detect(left), self.detector.detect(right)), stamp_s, eyes, models
+        )
+
+    def relate(
+        self,
+        images: tuple[NDArray[Any], NDArray[Any]],
+        seen: tuple[Detections, Detections],
+        stamp_s: float,
+        eyes: EyeAngles | None,
+        models: Models | None,
+    ) -> BoxVergenceResult:
+        """Return metric II of what was detected in a pair; see `measure`."""
+        p = self._parameters
+        geometry = PairGeometry(*models, eyes) if models is not None and eyes is not None else None
+        found = associate(seen[0].boxes(), seen[1].boxes(), p, self._vertical_px, images, geometry)
+        found = self._settle(found, stamp_s, geometry)
+        choice = self._memory.choose(found, stamp_s, seen[0].image_size_px, geometry)
+        if choice.pair is None:
+            self._filter.reset()
+            return self._one_eyed(choice, seen, models)
+        if choice.pair.ambiguous:
+            self._filter.reset()
+            only_left = self._one_eyed(Choice(left=choice.pair.left), seen, models)
+            return replace(
+                only_left,
+                right=choice.pair.right,
+                status=BoxStatus.AMBIGUOUS,
+                reason="another box of this class fits about as well",
+            )
+        return self._paired(choice.pair, images, seen, stamp_s, geometry, models)
+
+    def _settle(self, found: Association, stamp_s: float, geometry: PairGeometry | None) -> Association:
+        """Clear up ambiguous pairs that the past decides."""
+        pairs = [
+            replace(pair, ambiguous=False)
+            if pair.ambiguous and self._memory.confirms(pair, found, stamp_s, geometry)
+            else pair
+            for pair in found.pairs
+        ]
+        return replace(found, pairs=tuple(pairs))
+
+    def _one_eyed(
+        self, choice: Choice, seen: tuple[Detections, Detections], models: Models | None
+    ) -> BoxVergenceResult:
+        if choice.left is not None:
+            status, reason = BoxStatus.LEFT_ONLY, "the right eye does not see it"
+        elif choice.right is not None:
+            status, reason = BoxStatus.RIGHT_ONLY, "the left eye does not see it"
+        else:
+            status, reason = BoxStatus.NO_TARGET, "neither eye sees a target"
+        return BoxVergenceResult(
+            status,
+            reason,
+            *seen,
+            left=choice.left,
+            right=choice.right,
+            left_rad=_angles(models and models[0], choice.left),
+            right_rad=_angles(models and models[1], choice.right),
+        )
+
+    def _paired(
+        self,
+        pair: BoxPair,
+        images: tuple[NDArray[Any], NDArray[Any]],
+        seen: tuple[Detections, Detections],
+        stamp_s: float,
+        geometry: PairGeometry | None,
+        models: Models | None,
+    ) -> BoxVergenceResult:
+        p = self._parameters
+        left, right = self._smoothed(pair, stamp_s)
+        refined = refine(_grey(images[0]), _grey(images[1]), left, right) if p.refine else UNREFINED
+        expected_vertical = self._vertical_px
+        if geometry is not None:
+            expected_vertical += geometry.vertical_px(left.center_px, right.center_px[0])
+        hidden = hidden_sides(left, right, p.occluded_ratio, refined.horizontal_px, expected_vertical)
+        metric = corner_metric(left, right, hidden)
+        status, reason = BoxStatus.OK, ""
+        if left.is_cut or right.is_cut:
+            status, reason = BoxStatus.CUT, "a box is cut by the image's border"
+        elif any(hidden):
+            status, reason = BoxStatus.OCCLUDED, "the boxes' sizes disagree: partly hidden in one eye"
+        else:
+            self._learn_vertical(float(metric.center_px[1]) - (expected_vertical - self._vertical_px))
+        center_px, center_rad = _undistorted(models, left.center_px, (metric.center_px[0], metric.center_px[1]))
+        surface_px, _ = _undistorted(models, left.center_px, (refined.horizontal_px, refined.vertical_px))
+        source_per_input = seen[0].image_size_px[0] / self.detector.input_px[0]
+        sigma_px = disparity_sigma_px(left, right, source_per_input)
+        return BoxVergenceResult(
+            status,
+            reason,
+            *seen,
+            left=left,
+            right=right,
+            metric=metric,
+            center_px=center_px,
+            center_rad=center_rad,
+            sigma_px=sigma_px if math.isfinite(center_px[0]) else math.nan,
+            refined=replace(refined, horizontal_px=surface_px[0], vertical_px=surface_px[1]),
+            left_rad=_angles(models and models[0], left),
+            right_rad=_angles(models and models[1], right),
+            point=self._located(left, metric.center_px, refined, sigma_px, source_per_input, geometry),
+        )
+
+    def _located(
+        self,
+        left: Box,
+        center_px: NDArray[np.float64],
+        refined: Any,
+        sigma_px: float,
+        source_per_input: float,
+        geometry: PairGeometry | None,
+    ) -> TargetPoint | None:
+        if geometry is None:
+            return None
+        disparity = (refined.horizontal_px, refined.vertical_px)
+        sigma = refined.sigma_px
+        if not math.isfinite(disparity[0]):
+            disparity, sigma = (float(center_px[0]), float(center_px[1])), sigma_px
+        if not all(math.isfinite(value) for value in disparity):
+            return None
+        right_px = left.center_px[0] - disparity[0], left.center_px[1] - disparity[1]
+        sigmas = (center_sigma_px(left, source_per_input), sigma, JOINT_SIGMA_RAD)
+        return locate(
+            left.center_px, right_px, (geometry.left, geometry.right), geometry.eyes, self._baseline_m, sigmas
+        )
+
+    def _smoothed(self, pair: BoxPair, stamp_s: float) -> tuple[Box, Box]:
+        if self._parameters.smoothing_lag_s == 0.0:
+            return pair.left, pair.right
+        sides = self._filter.update(stamp_s, np.array([*pair.left.xyxy_px, *pair.right.xyxy_px]))
+        return (
+            replace(pair.left, xyxy_px=(float(sides[0]), float(sides[1]), float(sides[2]), float(sides[3]))),
+            replace(pair.right, xyxy_px=(float(sides[4]), float(sides[5]), float(sides[6]), float(sides[7]))),
+        )
+
+    def _learn_vertical(self, offset_px: float) -> None:
+        """Take the mounts' vertical offset from sure pairs: the mean of the first ones, then slowly."""
+        if not math.isfinite(offset_px):
+            return
+        self._vertical_count += 1
+        weight = max(_VERTICAL_WEIGHT, 1.0 / self._vertical_count)
+        learnt = self._vertical_px + weight * (offset_px - self._vertical_px)
+        self._vertical_px = min(max(learnt, -_LARGEST_VERTICAL_PX), _LARGEST_VERTICAL_PX)
+
+
+def measure_pair(
+    left_bgr: NDArray[Any],
+    right_bgr: NDArray[Any],
+    model_path: str | Path = "",
+    parameters: BoxMetricNodeParameters | None = None,
+    models: Models | None = None,
+) -> BoxVergenceResult:
+    """Return metric II of one pair of images with the detector in `model_path` ("" for the shipped one).
+
+    Raises DetectorError (a ValueError) with one clear line where the model or the images cannot be used.
+    """
+    chosen = (parameters or BoxMetricNodeParameters()).replaced(model=str(model_path))
+    return BoxMeasurement(chosen, baseline_m=math.nan).measure(left_bgr, right_bgr, models=models)
+
+
+def _grey(image: NDArray[Any]) -> NDArray[np.uint8]:
+    return np.asarray(image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
+
+
+def _angles(model: CameraModel | None, box: Box | None) -> tuple[float, float]:
+    if model is None or box is None:
+        return NAN2
+    azimuth, elevation = model.angles([box.center_px])[0]
+    return float(azimuth), float(elevation)
+
+
+def _undistorted(
+    models: Models | None, left_px: tuple[float, float], disparity_px: tuple[float, float]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return a disparity in undistorted pixels and in angle; as it is, and NaN, where the cameras are unknown."""
+    horizontal, vertical = float(disparity_px[0]), float(disparity_px[1])
+    if models is None:
+        return (horizontal, vertical), NAN2
+    found = angular_disparity(*models, left_px, horizontal, vertical)
+    return (found.horizontal_px, found.vertical_px), (found.horizontal_rad, found.vertical_rad)

@@ -1,0 +1,54 @@
+"""Where one eye can see what the other sees, from the joint angles: epipolar lines and the disparity of infinity."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import EyeAngles, rotation_rig_from_optical
+
+Pixel = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class PairGeometry:
+    """Both cameras and the joint angles at the images' stamps. Pixels are raw."""
+
+    left: CameraModel
+    right: CameraModel
+    eyes: EyeAngles
+
+    def direction(self, left_eye: bool, pixel: Pixel) -> np.ndarray:
+        """Return the unit direction (3,) in rig_base of one eye's pixel."""
+        camera = self.left if left_eye else self.right
+        return np.asarray(self._rotation(left_eye) @ camera.pixel_to_ray([pixel])[0])
+
+    def pixel(self, left_eye: bool, direction: np.ndarray) -> Pixel:
+        """Return where an eye sees an infinitely far point in a direction (3,); NaN behind it."""
+        camera = self.left if left_eye else self.right
+        u, v = camera.ray_to_pixel((self._rotation(left_eye).T @ direction)[None])[0]
+        return float(u), float(v)
+
+    def parallel_px(self, left_px: Pixel) -> float:
+        """Return the disparity of an infinitely far point at a left pixel; -inf where it is out of view."""
+        u, _ = self.pixel(False, self.direction(True, left_px))
+        return left_px[0] - u if math.isfinite(u) else -math.inf
+
+    def vertical_px(self, left_px: Pixel, right_x_px: float) -> float:
+        """Return y_left - y_right of the point seen at a left pixel and at a column of the right image.
+
+        Both eyes, and every point on the left ray, lie in one plane; it cuts the right image in a line.
+        """
+        baseline = np.array([0.0, 1.0, 0.0])
+        normal = self._rotation(False).T @ np.cross(baseline, self.direction(True, left_px))
+        if abs(normal[1]) < 1e-6:
+            return 0.0
+        x = float(self.right.undistort([(right_x_px, left_px[1])])[0][0])
+        y = -(normal[0] * x + normal[2]) / normal[1]
+        v = float(self.right.distort([(x, y)])[0][1])
+        return left_px[1] - v if math.isfinite(v) else 0.0
+
+    def _rotation(self, left_eye: bool) -> np.ndarray:
+        pan_rad = self.eyes.pan_left_rad if left_eye else self.eyes.pan_right_rad
+        return np.asarray(rotation_rig_from_optical(pan_rad, self.eyes.tilt_rad))
