@@ -60,7 +60,7 @@ class StationRunner:
         self._look_at_angles(station)
         recorder.settle(_SETTLE_S, self._alive)
         recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._alive)
-        recorder.set_parameters("sim_node", {"target": station.target, **station.motion}, self._alive)
+        recorder.set_parameters("sim_node", {"target": station.target}, self._alive)
         self._show(station, station.place_m or self._fixation_m())
         shown_at = recorder.now_s()
         truth = recorder.wait_for(
@@ -71,9 +71,10 @@ class StationRunner:
 
         began = recorder.now_s()
         marks = len(recorder.states), len(recorder.edges), len(recorder.truths)
-        truth = recorder.truths[-1].message if station.moving else truth
         result = recorder.look_at(_click(truth), self._alive, _LIMIT_S + 10.0)
         reason = "" if result.result == LookAt.Result.VERGED else result.reason
+        if station.moving:
+            recorder.set_parameters("sim_node", dict(station.motion), self._alive)
         recorder.settle(station.hold_s, self._alive)
         after = recorder.picture(self._alive)
         self._store(station, "end", after)
