@@ -11,7 +11,7 @@ from vergence_rig.parameters import ParameterSpec
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 
-NOT_EXECUTABLES = {"rig"}
+NOT_EXECUTABLES = {"rig", "servos"}
 
 
 def specs_of(executable: str) -> dict[str, ParameterSpec]:

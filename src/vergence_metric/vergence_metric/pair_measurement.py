@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
+from vergence_metric.edge_parameters import EdgeMetricParameters
+from vergence_metric.fovea_parameters import DisparityParameters, TrackerParameters
 from vergence_metric.tracker import TargetTracker, Track, TrackStatus
 from vergence_metric.verged import VergedJudge
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
+from vergence_rig.parameters import Parameters
 from vergence_rig.rig import Rig
 
 Models = tuple[CameraModel, CameraModel]
@@ -28,7 +31,10 @@ class PairMeasurement:
         self._models: Models | None = None
         self._ids_used = 0
         self._newest_id = 0
-        self._build(parameters)
+        self._parameters = parameters
+        self._metric = EdgeMetric(parameters)
+        self._judge = VergedJudge(parameters)
+        self._estimator = make_estimator(parameters)
 
     @property
     def parameters(self) -> EdgeMetricNodeParameters:
@@ -36,9 +42,16 @@ class PairMeasurement:
         return self._parameters
 
     def set_parameters(self, parameters: EdgeMetricNodeParameters) -> None:
-        """Measure the next pair by these; the tracker forgets its target."""
-        if parameters != self._parameters:
-            self._build(parameters)
+        """Measure the next pair by these; what is unconcerned keeps what it has learnt, the tracker its target."""
+        before, self._parameters = self._parameters, parameters
+        if _differ(EdgeMetricParameters, before, parameters):
+            self._metric = EdgeMetric(parameters)
+            self._judge = VergedJudge(parameters)
+        if _differ(DisparityParameters, before, parameters):
+            self._estimator = make_estimator(parameters)
+            self._tracker = None
+        if _differ(TrackerParameters, before, parameters):
+            self._tracker = None
 
     def edge(self, left: NDArray[Any], right: NDArray[Any]) -> EdgeMetricResult:
         """Return metric I of a pair of images of one size; raises ImageShapeError for others."""
@@ -74,15 +87,13 @@ class PairMeasurement:
         self._newest_id = self._ids_used + track.track_id
         return replace(track, track_id=self._newest_id)
 
-    def _build(self, parameters: EdgeMetricNodeParameters) -> None:
-        self._parameters = parameters
-        self._metric = EdgeMetric(parameters)
-        self._estimator = make_estimator(parameters)
-        self._judge = VergedJudge(parameters)
-        self._tracker = None
-
     def _nothing(self, reason: str) -> Track:
         nan = math.nan
         return Track(
             self._newest_id, nan, (nan, nan), (nan, nan), nan, nan, nan, (nan, nan), 0.0, TrackStatus.UNLOCKED, reason
         )
+
+
+def _differ(kind: type[Parameters], one: Parameters, other: Parameters) -> bool:
+    """Tell whether two sets differ in a parameter of the part `kind`."""
+    return one is not other and any(getattr(one, s.name) != getattr(other, s.name) for s in kind.specs())

@@ -1,0 +1,77 @@
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from vergence_metric.edge_metric import EdgeMetricResult
+from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
+from vergence_metric.pair_measurement import PairMeasurement
+from vergence_metric.tracker import Track, TrackStatus
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.rig import default_rig
+
+AT_REST = EyeAngles(0.0, 0.0, 0.0)
+
+
+def view(shift_px: int, height: int = 480, width: int = 640) -> np.ndarray:
+    random = np.random.default_rng(5)
+    wide = cv2.GaussianBlur(random.integers(0, 256, (height, width + 40, 3), np.uint8), (0, 0), 3.0)
+    wide = cv2.normalize(wide, None, 0, 255, cv2.NORM_MINMAX)
+    return np.ascontiguousarray(wide[:, shift_px : shift_px + width])
+
+
+@pytest.fixture
+def measurement() -> PairMeasurement:
+    return PairMeasurement(EdgeMetricNodeParameters(), default_rig())
+
+
+@pytest.fixture(scope="module")
+def pair() -> EdgeMetricResult:
+    return PairMeasurement(EdgeMetricNodeParameters(), default_rig()).edge(view(0), view(0))
+
+
+def locked(measurement: PairMeasurement, pair: EdgeMetricResult, start_s: float) -> Track:
+    """Show the pair until the tracker has locked on the fovea."""
+    for i in range(40):
+        track = measurement.track(pair, start_s + i / 30, AT_REST, None)
+        if track.status is TrackStatus.OK:
+            return track
+    raise AssertionError(track)
+
+
+def test_one_pair_gives_metric_disparity_and_verdict(measurement: PairMeasurement) -> None:
+    edge = measurement.edge(view(0), view(9))
+    disparity = measurement.disparity(edge)
+    assert disparity.horizontal_px == pytest.approx(9.0, abs=0.05)
+    assert not measurement.verged(edge, disparity.horizontal_px, disparity.confidence)
+    edge = measurement.edge(view(0), view(0))
+    disparity = measurement.disparity(edge)
+    assert edge.left_to_right_px.max() == 0.0
+    assert measurement.verged(edge, disparity.horizontal_px, disparity.confidence)
+
+
+def test_a_change_elsewhere_leaves_the_target_and_one_of_the_tracker_gives_a_new_id(
+    measurement: PairMeasurement, pair: EdgeMetricResult
+) -> None:
+    first = locked(measurement, pair, 0.0)
+    measurement.set_parameters(measurement.parameters.replaced(windows_px=(60,), pair_slop_s=0.01))
+    assert measurement.edge(view(0), view(0)).windows_px.tolist() == [60]
+    assert measurement.track(pair, 10.0, AT_REST, None).track_id == first.track_id
+    measurement.set_parameters(measurement.parameters.replaced(track_settle_s=0.05))
+    second = locked(measurement, pair, 20.0)
+    assert second.track_id == first.track_id + 1
+    measurement.set_parameters(measurement.parameters.replaced(disparity_estimator="zncc"))
+    assert measurement.disparity(pair).estimator == "zncc"
+    assert locked(measurement, pair, 30.0).track_id == second.track_id + 1
+
+
+def test_without_joints_or_a_fitting_camera_there_is_no_track_but_a_reason(
+    measurement: PairMeasurement, pair: EdgeMetricResult
+) -> None:
+    track = measurement.track(pair, 0.0, None, None)
+    assert (track.status, track.reason) == (TrackStatus.UNLOCKED, "no joint_states at the image's stamp")
+    assert math.isnan(track.disparity_px)
+    small = measurement.edge(view(0, 120, 160), view(0, 120, 160))
+    track = measurement.track(small, 0.0, AT_REST, None)
+    assert (track.status, track.reason) == (TrackStatus.UNLOCKED, "no camera is described for images of 160x120")
