@@ -74,8 +74,10 @@ def measure(skew_ns: int, seconds: float, shipped_profile: bool) -> Outcome:
             environment[_PROFILE] = ""
         with ProcessGroup(OUT_DIR / "graph_logs", environment) as nodes:
             nodes.start("edge_metric_node", NodeCommand("vergence_metric", "edge_metric_node"))
-            with _eyes(os.environ | environment, nodes) as eyes:
-                return _timed_run(eyes, domain, skew_ns, seconds)
+            with _receiver(domain) as receiver, _eyes(os.environ | environment, nodes) as eyes:
+                while not receiver.is_matched():
+                    nodes.check()
+                return _timed_run(eyes, receiver, skew_ns, seconds)
 
 
 class Eye:
@@ -131,13 +133,12 @@ def _eyes(environment: dict[str, str], nodes: ProcessGroup) -> Iterator[list[Eye
             eye.end()
 
 
-def _timed_run(eyes: list[Eye], domain: int, skew_ns: int, seconds: float) -> Outcome:
-    count, start_ns = round(seconds * 30), time.monotonic_ns() + 1_500_000_000
-    with _receiver(domain) as receiver:
-        for eye, offset_ns in zip(eyes, (0, skew_ns), strict=True):
-            eye.start(start_ns=start_ns, period_ns=PERIOD_NS, offset_ns=offset_ns, count=count)
-        receiver.spin_until(start_ns + count * PERIOD_NS + 1_000_000_000)
-        left, right = (eye.published_ns() for eye in eyes)
+def _timed_run(eyes: list[Eye], receiver: "Receiver", skew_ns: int, seconds: float) -> Outcome:
+    count, start_ns = round(seconds * 30), time.monotonic_ns() + 1_000_000_000
+    for eye, offset_ns in zip(eyes, (0, skew_ns), strict=True):
+        eye.start(start_ns=start_ns, period_ns=PERIOD_NS, offset_ns=offset_ns, count=count)
+    receiver.spin_until(start_ns + count * PERIOD_NS + 1_000_000_000)
+    left, right = (eye.published_ns() for eye in eyes)
     later_ns = {stamp: max(published, right[stamp + skew_ns]) for stamp, published in left.items()}
     latency = [receiver.arrived_ns[stamp] - later_ns[stamp] for stamp in later_ns if stamp in receiver.arrived_ns]
     return Outcome(len(latency) / len(later_ns), np.array(latency) * 1e-6, receiver.stages)
@@ -162,6 +163,11 @@ class Receiver:
         for status in message.status:
             if status.name == "edge_metric_node: measurement":
                 self.stages.update((pair.key, pair.value) for pair in status.values)
+
+    def is_matched(self) -> bool:
+        """Receive for a little; True once the node is heard, so that it has found this receiver too."""
+        self.executor.spin_once(timeout_sec=0.2)
+        return bool(self.stages)
 
     def spin_until(self, end_ns: int) -> None:
         """Receive until a monotonic time."""
