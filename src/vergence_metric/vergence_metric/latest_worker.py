@@ -15,8 +15,8 @@ _HAND_OVER_S = 0.0002
 class LatestWorker(Generic[Item]):
     """Runs `work(item)` for the newest item submitted, one at a time, on a thread of its own.
 
-    `submit` is for one thread, never waits for `work` and takes no lock that `work` could hold. An exception of `work` goes to
-    `on_error` and the next item is worked on.
+    `submit` is for one thread, never waits for `work` and takes no lock that `work` could hold. An exception of `work`
+    goes to `on_error` and the next item is worked on.
     """
 
     def __init__(self, work: Callable[[Item], None], on_error: Callable[[Exception], None], name: str) -> None:
