@@ -1,6 +1,5 @@
 """Network streams that have to be decoded (RTSP, H.264 over HTTP, ...), by OpenCV's bundled ffmpeg."""
 
-import os
 import time
 
 import cv2
@@ -34,8 +33,6 @@ class DecodedStreamSource:
     def open(self) -> Mode:
         """See FrameSource."""
         self.close()
-        # Without this ffmpeg queues up seconds of video while nobody reads.
-        os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", "fflags;nobuffer|flags;low_delay")
         limits = [
             *(cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, int(self._open_timeout_s * 1000)),
             *(cv2.CAP_PROP_READ_TIMEOUT_MSEC, int(self._stall_timeout_s * 1000)),
