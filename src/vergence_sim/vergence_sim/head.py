@@ -1,8 +1,9 @@
 """The simulated head's joints: servo plants that turn MuJoCo's hinges."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
-from vergence_rig.rig import JOINT_NAMES, Rig
+from vergence_rig.rig import JOINT_NAMES, Joints, Rig
 from vergence_rig.servo import PRESETS, ServoPlant
 from vergence_sim.parameters import SimParameters
 
@@ -15,7 +16,14 @@ class Head:
     """Three servo plants by joint name; a command is limited to the rig's joint limits."""
 
     def __init__(self, rig: Rig, parameters: SimParameters) -> None:
-        self.rig = rig if parameters.servo == "rig" else rig.with_servos(PRESETS[parameters.servo])
+        rig = rig if parameters.servo == "rig" else rig.with_servos(PRESETS[parameters.servo])
+        if parameters.servo_latency_s >= 0:
+            late = [
+                replace(joint, servo=joint.servo.replaced(command_latency_s=parameters.servo_latency_s))
+                for _, joint in rig.joints.items()
+            ]
+            rig = replace(rig, joints=Joints(*late))
+        self.rig = rig
         self._plants = {name: ServoPlant(joint.servo, 0.0) for name, joint in self.rig.joints.items()}
 
     def command(self, angles_rad: Mapping[str, float], now_s: float) -> None:
@@ -42,6 +50,11 @@ class Head:
     def true_rad(self) -> dict[str, float]:
         """Where the shafts are."""
         return {name: plant.true_rad for name, plant in self._plants.items()}
+
+    @property
+    def velocity_rad_s(self) -> dict[str, float]:
+        """How fast the servos turn."""
+        return {name: plant.velocity_rad_s for name, plant in self._plants.items()}
 
     @property
     def modelled_rad(self) -> dict[str, float]:

@@ -71,9 +71,9 @@ class ModelBuilder:
         """Put shapes or bodies into the world."""
         self._bodies += elements
 
-    def movable(self, name: str, *shapes: str) -> None:
-        """Put a body into the world that goes where it is put; it starts below the floor."""
-        self._bodies.append(f'<body name="{name}" mocap="true" pos="0 0 -5">{"".join(shapes)}</body>')
+    def movable(self, name: str, *shapes: str, place_m: tuple[float, float, float] = (0.0, 0.0, -5.0)) -> None:
+        """Put a body into the world that goes where it is put; it starts below the floor unless told."""
+        self._bodies.append(f'<body name="{name}" mocap="true" pos="{_text(place_m)}">{"".join(shapes)}</body>')
 
     def compiled(self, size_px: tuple[int, int], samples: int, headlight: str, lights: str) -> mujoco.MjModel:
         """Return the model. `size_px` is (width, height) of its views; `headlight` and `lights` are MJCF."""

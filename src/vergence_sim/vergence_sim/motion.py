@@ -19,4 +19,7 @@ def offset_m(parameters: SimParameters, elapsed_s: float) -> Array:
         return extent * elapsed_s
     if parameters.motion == "sinusoid":
         return extent * math.sin(2 * math.pi * parameters.motion_frequency_hz * elapsed_s)
+    if parameters.motion == "stations":
+        stations = np.reshape(parameters.stations_m, (-1, 3))
+        return np.array(stations[min(int(elapsed_s / parameters.station_s), len(stations) - 1)], np.float64)
     return np.zeros(3)

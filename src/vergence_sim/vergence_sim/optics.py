@@ -1,4 +1,4 @@
-"""What a cheap webcam does to a rendered view: lens distortion, exposure, white balance, noise, JPEG."""
+"""What a cheap webcam does to a rendered view: motion blur, lens distortion, exposure, white balance, noise, JPEG."""
 
 import math
 from typing import Any
@@ -13,6 +13,21 @@ from vergence_sim.parameters import SimParameters
 Image = npt.NDArray[np.uint8]
 
 _NOISE_BANK = 8
+
+
+_LEAST_SMEAR_PX = 2.0
+
+
+def smeared(view: Image, motion_px: tuple[float, float]) -> Image:
+    """Return a view (h, w, 3) that moved by `motion_px` (x, y) while it was exposed.
+
+    The whole view moves alike, as it does when the eye turns: a target that the eye follows is not held sharp. Less
+    than two pixels are left alone.
+    """
+    width, height = (round(abs(value)) for value in motion_px)
+    if max(width, height) < _LEAST_SMEAR_PX:
+        return view
+    return np.asarray(cv2.blur(view, (max(width, 1), max(height, 1)), borderType=cv2.BORDER_REPLICATE), np.uint8)
 
 
 class Lens:
@@ -48,12 +63,20 @@ class Lens:
 
     def distorted(self, pixel: tuple[float, float]) -> tuple[float, float]:
         """Return where the lens puts what an ideal one would put at `pixel` (x, y) [px]; NaN stays NaN."""
-        if math.isnan(pixel[0]) or not self._distortion.any():
+        if math.isnan(pixel[0]):
             return pixel
-        x, y = (pixel[0] - self.camera.cx_px) / self.camera.fx_px, (pixel[1] - self.camera.cy_px) / self.camera.fy_px
-        ray = np.array([[[x, y, 1.0]]])
-        placed, _ = cv2.projectPoints(ray, np.zeros(3), np.zeros(3), self._matrix, self._distortion)
-        return float(placed[0, 0, 0]), float(placed[0, 0, 1])
+        ((x, y),) = self.distorted_points(np.array([pixel])).tolist()
+        return x, y
+
+    def distorted_points(self, points_px: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return where the lens puts what an ideal one would put at (N, 2) finite pixels."""
+        if not self._distortion.any():
+            return points_px
+        camera = self.camera
+        centre, focal = np.array([camera.cx_px, camera.cy_px]), np.array([camera.fx_px, camera.fy_px])
+        rays = np.column_stack([(points_px - centre) / focal, np.ones(len(points_px))])
+        placed, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), self._matrix, self._distortion)
+        return np.asarray(placed, np.float64).reshape(-1, 2)
 
 
 class Sensor:

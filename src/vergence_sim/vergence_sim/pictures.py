@@ -169,6 +169,28 @@ def cube_faces(rng: np.random.Generator, cells: int = 3, size_px: int = 192) -> 
     return faces
 
 
+def look_alike_faces(rng: np.random.Generator, size_px: int = 128) -> list[Image]:
+    """Return six faces of what is no Rubik's cube: puzzles of another size, dice, plain and striped bricks."""
+    kind = str(rng.choice(["two", "four", "five", "die", "plain", "stripes"]))
+    cells = {"two": 2, "four": 4, "five": 5}
+    if kind in cells:
+        return cube_faces(rng, cells[kind], size_px)
+    base, ink = (CUBE_COLOURS_BGR[int(c)] for c in rng.permutation(6)[:2])
+    faces = []
+    for _ in range(6):
+        face = np.empty((size_px, size_px, 3), np.float32)
+        face[:] = base
+        if kind == "die":
+            for spot in rng.permutation(9)[: int(rng.integers(1, 7))].tolist():
+                centre = ((spot % 3 * 2 + 1) * size_px // 6, (spot // 3 * 2 + 1) * size_px // 6)
+                cv2.circle(face, centre, size_px // 14, ink, -1, cv2.LINE_AA)
+        elif kind == "stripes":
+            for row in range(0, size_px, size_px // 4):
+                face[row : row + size_px // 8] = ink
+        faces.append(shaded(face, cloud(rng, (size_px, size_px), 5) * 3 + grain(rng, (size_px, size_px)) * 3))
+    return faces
+
+
 def stickers(rng: np.random.Generator, colours: Sequence[Colour], cells: int, size_px: int) -> Image:
     """Return a face of a cube, `cells` by `cells` stickers of the given colours, row by row."""
     face = np.full((size_px, size_px, 3), 20, np.float32)

@@ -22,12 +22,14 @@ class EyeRenderer:
         self._context: Any = None
         try:
             self._context = mujoco.GLContext(width_px, height_px)
+            self._context.make_current()
+            self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         except Exception as error:
             raise RenderError(
-                f"MuJoCo cannot render with MUJOCO_GL={os.environ.get('MUJOCO_GL')}: {error}; install libegl1 and "
-                "libgl1-mesa-dri, or libosmesa6 and set MUJOCO_GL=osmesa"
+                f"MuJoCo cannot render offscreen with MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}: {error}; install "
+                "libegl1 and libgl1-mesa-dri, or libosmesa6; set MUJOCO_GL to egl or osmesa, or not at all, before "
+                "MuJoCo is imported"
             ) from error
-        self._context.make_current()
         self._model = model
         self._scene = mujoco.MjvScene(model, maxgeom=1000)
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
@@ -36,7 +38,6 @@ class EyeRenderer:
         self._perturb = mujoco.MjvPerturb()
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
-        self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
         self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZERONEAR
         self._viewport = mujoco.MjrRect(0, 0, width_px, height_px)

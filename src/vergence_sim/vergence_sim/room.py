@@ -50,6 +50,12 @@ class Room:
         for put in (self._stool, self._table, self._plant, self._armchair, self._boxes, self._shelf, self._lamp):
             put()
 
+    def free_table_places(self, count: int) -> list[_Triple]:
+        """Return `count` places along the table's near edge, where nothing else stands."""
+        rng = np.random.default_rng([self._seed, 7])
+        y = self._mirror * 0.25 + 0.85 * np.linspace(-1, 1, 2 * count + 1)[1::2] if count else np.empty(0)
+        return [(2.15 + float(rng.uniform(0.0, 0.04)), float(v), 0.75) for v in rng.permutation(y)]
+
     def shell(self) -> None:
         """Put in walls, floor, ceiling and a rug."""
         rng, length, middle = np.random.default_rng([self._seed, 6]), FRONT_M - BACK_M, 0.5 * (FRONT_M + BACK_M)

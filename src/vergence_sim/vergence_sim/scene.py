@@ -8,14 +8,17 @@ import numpy as np
 
 from vergence_rig.rig import Rig
 from vergence_sim.model_builder import HIDDEN_GROUP, ModelBuilder
-from vergence_sim.parameters import SimParameters
-from vergence_sim.pictures import book_cover, cube_faces
+from vergence_sim.parameters import TARGETS, SimParameters
+from vergence_sim.pictures import book_cover, cube_faces, look_alike_faces
 from vergence_sim.room import Room
 from vergence_sim.surfaces import Image, cloth, muted, shaded
 
 HEAD_HEIGHT_M = 1.15
 CUBE_SIDE_M = 0.057
 MARKER_LENGTH_M, MARKER_RADIUS_M = 0.14, 0.008
+EXTRA_CUBES = ("cube2", "cube3", "cube4")
+OBJECTS = (*TARGETS, "occluder", *EXTRA_CUBES)
+"""What can be put somewhere; the extra cubes only where the room has them."""
 
 
 class SceneBuilder(ModelBuilder):
@@ -56,6 +59,22 @@ class SceneBuilder(ModelBuilder):
             "occluder",
             self.shape("box", (0, 0, 0), (0.01, 0.09, 0.12), self._wrapped("occluder", board), name="occluder"),
         )
+
+    def crowd(self, extra_cubes: int, look_alikes: int) -> None:
+        """Put more Rubik's cubes on the table, and things that share their colours or their pattern."""
+        half = CUBE_SIDE_M / 2
+        places = self._room.free_table_places(extra_cubes + look_alikes)
+        for number, name in enumerate(EXTRA_CUBES[:extra_cubes]):
+            x, y, z = places[number]
+            faces = self._wrapped(name, cube_faces(np.random.default_rng([self._seed, 8, number])))
+            shape = self.shape("box", (0, 0, 0), (half, half, half), faces, name=name)
+            self.movable(name, shape, place_m=(x, y, z + half))
+        for number, (x, y, z) in enumerate(places[extra_cubes:]):
+            rng = np.random.default_rng([self._seed, 9, number])
+            name, side = f"look_alike{number}", half * float(rng.uniform(0.8, 1.5))
+            faces = self._wrapped(name, look_alike_faces(rng))
+            turn = (0.0, 0.0, float(rng.uniform(-0.7, 0.7)))
+            self.add(self.shape("box", (x, y, z + side), (side, side, side), faces, turn, name))
 
     def head(self, fovy_rad: float, mounts: dict[str, tuple[float, float]]) -> None:
         """The paper's second hardware design: two pans on top of a tilt bar, a camera on each, on a turning base.
@@ -151,11 +170,14 @@ def _compiled(
     light: float,
     fovy_rad: float,
     mounts: tuple[tuple[float, float], ...],
+    extra_cubes: int,
+    look_alikes: int,
     textured: bool,
 ) -> mujoco.MjModel:
     builder = SceneBuilder(rig, seed, samples, textured)
     # Near things first: what is drawn behind them is never textured.
     builder.targets()
+    builder.crowd(extra_cubes, look_alikes)
     builder.furniture()
     builder.room()
     builder.head(fovy_rad, dict(zip(("left", "right"), mounts, strict=True)))
@@ -168,4 +190,14 @@ def build_scene(rig: Rig, parameters: SimParameters, fovy_rad: float, textured: 
     The model is shared by all who ask for the same one: do not change it.
     """
     mounts = ((parameters.left_roll_rad, 0.0), (parameters.right_roll_rad, parameters.right_pitch_rad))
-    return _compiled(rig, parameters.world_seed, parameters.samples, parameters.light, fovy_rad, mounts, textured)
+    return _compiled(
+        rig,
+        parameters.world_seed,
+        parameters.samples,
+        parameters.light,
+        fovy_rad,
+        mounts,
+        parameters.extra_cubes,
+        parameters.look_alikes,
+        textured,
+    )

@@ -50,7 +50,8 @@ class SimNode(Node):
         self._true_target = qos.create_publisher(PointStamped, "ground_truth/target")
         self._subscriptions_kept = [
             qos.create_subscription(JointState, "joint_command", self._on_command),
-            qos.create_subscription(PointStamped, "sim/target_pose", self._on_target),
+            qos.create_subscription(PointStamped, "sim/target_pose", lambda m: self._on_place("target", m)),
+            qos.create_subscription(PointStamped, "sim/occluder_pose", lambda m: self._on_place("occluder", m)),
         ]
         settings.on_change(self._on_settings)
         self._notes: deque[tuple[str, Any, float]] = deque()
@@ -85,11 +86,11 @@ class SimNode(Node):
         angles = dict(zip(message.name, message.position, strict=True))
         self._notes.append(("command", angles, self._now_s()))
 
-    def _on_target(self, message: PointStamped) -> None:
+    def _on_place(self, what: str, message: PointStamped) -> None:
         if message.header.frame_id not in ("", "rig_base"):
-            self._refuse(f"sim/target_pose is in frame {message.header.frame_id!r}: allowed is 'rig_base'")
+            self._refuse(f"sim/{what}_pose is in frame {message.header.frame_id!r}: allowed is 'rig_base'")
             return
-        self._notes.append(("target", (message.point.x, message.point.y, message.point.z), self._now_s()))
+        self._notes.append((what, (message.point.x, message.point.y, message.point.z), self._now_s()))
 
     def _on_settings(self, settings: ParameterSet) -> None:
         self._notes.append(("settings", settings.value, self._now_s()))
@@ -129,6 +130,8 @@ class SimNode(Node):
                     simulator.command(value, arrived_s - start_s)
                 elif kind == "target":
                     simulator.place_target(simulator.parameters.target, value)
+                elif kind == "occluder":
+                    simulator.place_occluder(value)
                 else:
                     simulator.set_parameters(value)
                     schedule.set_jitter(value.effective().frame_jitter_s)

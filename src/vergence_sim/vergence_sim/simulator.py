@@ -11,10 +11,10 @@ import numpy.typing as npt
 from vergence_rig.rig import Rig, default_rig
 from vergence_sim.head import Head
 from vergence_sim.motion import offset_m
-from vergence_sim.optics import Lens, Sensor
+from vergence_sim.optics import Lens, Sensor, smeared
 from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.renderer import EyeRenderer
-from vergence_sim.scene import build_scene
+from vergence_sim.scene import OBJECTS, build_scene
 from vergence_sim.truth import TrueBox, Truth, TruthTeller
 
 Array = npt.NDArray[np.float64]
@@ -81,7 +81,10 @@ class Simulator:
     def set_parameters(self, parameters: SimParameters) -> None:
         """Take changed parameters (those that are not fixed at the start); a changed motion begins now."""
         parameters = parameters.effective()
-        names = ("target", "motion", "motion_x_m", "motion_y_m", "motion_z_m", "motion_frequency_hz")
+        names = (
+            "target",
+            *(spec.name for spec in SimParameters.specs() if spec.name.startswith(("motion", "station"))),
+        )
         if any(getattr(parameters, name) != getattr(self.parameters, name) for name in names):
             self._motion_since_s = self.time_s
         if parameters.target != self.parameters.target:
@@ -125,22 +128,56 @@ class Simulator:
         self._motion_since_s = self.time_s
         self._update()
 
+    def place_object(self, name: str, point_m: Sequence[float] | Array) -> None:
+        """Put any movable thing somewhere in rig_base (3,) [m]; which one is the target stays as it is.
+
+        There are both targets, `occluder`, and as many of `cube2`, `cube3`, `cube4` as `extra_cubes` asks for. What is
+        below the floor is hidden.
+        """
+        place = np.asarray(point_m, np.float64)
+        if name not in OBJECTS or mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, name) < 0:
+            raise TargetError(f"object is {name!r}: allowed is one of {', '.join(OBJECTS)}, if the room has it")
+        if place.shape != (3,) or not np.isfinite(place).all():
+            raise TargetError(f"place is {point_m!r}: allowed are three finite numbers [m]")
+        self._places[name] = place
+        self._update()
+
     def place_occluder(self, point_m: Sequence[float] | Array) -> None:
         """Put the occluder, an upright board 18 by 24 cm, somewhere in rig_base (3,) [m]."""
-        self._data.mocap_pos[self._mocap("occluder")] = self._in_world(np.asarray(point_m, np.float64))
-        mujoco.mj_kinematics(self._model, self._data)
+        self.place_object("occluder", point_m)
 
     def view(self, eye: str) -> Image:
         """Return what one eye, "left" or "right", sees now: (h, w, 3) BGR uint8."""
         if self._renderer is None:
             raise ValueError("this simulator was made with render=False: it takes no pictures")
-        return self._sensors[eye].apply(self.lenses[eye].apply(self._renderer.render(self._data, eye)), self.parameters)
+        view = self._renderer.render(self._data, eye)
+        if self.parameters.exposure_s > 0:
+            view = smeared(view, self._motion_px(eye))
+        return self._sensors[eye].apply(self.lenses[eye].apply(view), self.parameters)
 
-    def capture(self, skew_s: float = 0.0) -> StereoFrame:
-        """Return a pair exposed now; with a skew the right eye's exposure is that much later, and time has passed."""
+    def capture(self, skew_s: float | None = None) -> StereoFrame:
+        """Return the next pair, the first of the two exposed now; its truth is that of the left exposure.
+
+        The right eye is exposed `skew_s` after the left one, before it if negative; None lets the two free-running
+        clocks say. That much time has passed afterwards.
+        """
+        skew_s = self.skew_s if skew_s is None else skew_s
+        right, right_stamp_s = None, self.time_s
+        if skew_s < 0:
+            right = self.view("right")
+            self.advance(-skew_s)
         truth, left_stamp_s, left = self.truth(), self.time_s, self.view("left")
-        self.advance(skew_s)
-        return StereoFrame(left, self.view("right"), left_stamp_s, self.time_s, truth)
+        if right is None:
+            self.advance(skew_s)
+            right, right_stamp_s = self.view("right"), self.time_s
+        return StereoFrame(left, right, left_stamp_s, right_stamp_s, truth)
+
+    @property
+    def skew_s(self) -> float:
+        """How much later than the left eye the right one's nearest exposure is now [s], within half a period."""
+        parameters = self.parameters
+        skew_s = parameters.right_clock_offset_s + parameters.right_clock_drift * self.time_s
+        return math.remainder(skew_s, 1.0 / parameters.frame_rate_hz)
 
     def truth(self) -> Truth:
         """Return the truth about the target now."""
@@ -155,8 +192,8 @@ class Simulator:
         return self._truth.axis_errors(self._in_world(np.asarray(point_m, np.float64)))
 
     def true_boxes(self, eye: str) -> list[TrueBox]:
-        """Return the true boxes of all targets in one eye's image."""
-        boxes = (self._truth.box(eye, name) for name in TARGETS)
+        """Return the true boxes of the targets in one eye's image, as the lens distorts it; further cubes included."""
+        boxes = (self._truth.box(eye, name) for name in self._truth.objects)
         return [box for box in boxes if box is not None]
 
     def joint_states(self) -> dict[str, float]:
@@ -173,6 +210,12 @@ class Simulator:
             self._renderer.close()
             self._renderer = None
 
+    def _motion_px(self, eye: str) -> tuple[float, float]:
+        rates = self.head.velocity_rad_s
+        focal_px, exposure_s = self.lenses[eye].camera.fx_px, self.parameters.exposure_s
+        sideways = rates[f"pan_{eye}"] + self.parameters.rig_yaw_rate_rad_s
+        return focal_px * sideways * exposure_s, focal_px * rates["tilt"] * exposure_s
+
     def _hide(self, name: str) -> None:
         self._places[name] = np.array([0.0, 0.3 * TARGETS.index(name), -5.0])  # below the floor
 
@@ -188,6 +231,9 @@ class Simulator:
                 else place
             )
             data.mocap_pos[self._mocap(name)] = self._in_world(moved)
+            if name in TARGETS:
+                half = 0.5 * self.parameters.target_yaw_rad
+                data.mocap_quat[self._mocap(name)] = (math.cos(half), 0.0, 0.0, math.sin(half))
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_camlight(self._model, data)
 

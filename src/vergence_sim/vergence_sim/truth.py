@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_sim.optics import Lens
+from vergence_sim.parameters import TARGETS
+from vergence_sim.scene import EXTRA_CUBES
 
 Array = npt.NDArray[np.float64]
 
@@ -20,7 +22,7 @@ _SEEN_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 
 @dataclass(frozen=True)
 class TrueBox:
-    """An object's box in one eye's image, before the lens distorts it [px]; None where it is out of view."""
+    """An object's box in one eye's image, as the lens distorts it [px]. `name` is its class."""
 
     name: str
     x_min_px: float
@@ -66,9 +68,15 @@ class TruthTeller:
                 for i in range(model.ngeom)
                 if model.geom_bodyid[i] == mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
             ]
-            for name in ("cube", "marker")
+            for name in (*TARGETS, *EXTRA_CUBES)
         }
+        self._geoms = {name: geoms for name, geoms in self._geoms.items() if geoms}
         self._hit = np.zeros(1, np.int32)
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """What there are boxes of: the targets and further cubes, seen or not."""
+        return tuple(self._geoms)
 
     def target_point_world(self, target: str) -> Array:
         """Return where the ray from the rig's origin through the target's centre meets the target's surface (3,)."""
@@ -118,12 +126,13 @@ class TruthTeller:
         places = np.array([self.project(eye, point) for point in self._outline(target)])
         if np.isnan(places).any():
             return None
+        places = self._lenses[eye].distorted_points(places)
         width, height = self._lenses[eye].camera.width_px, self._lenses[eye].camera.height_px
         low, high = places.min(axis=0), places.max(axis=0)
         if high[0] < 0 or high[1] < 0 or low[0] > width - 1 or low[1] > height - 1:
             return None
         return TrueBox(
-            target,
+            "cube" if target in EXTRA_CUBES else target,
             float(max(low[0], 0)),
             float(max(low[1], 0)),
             float(min(high[0], width - 1)),
