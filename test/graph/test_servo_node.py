@@ -164,7 +164,12 @@ def test_a_trajectory_is_interpolated(make_graph: Callable[..., Graph]):
     point = JointTrajectoryPoint(positions=[0.5], time_from_start=Duration(sec=1))
     publisher.publish(JointTrajectory(joint_names=["pan_left"], points=[point]))
     seen: set[float] = set()
-    graph.until(lambda: seen.add(graph.duty_us(0)) or graph.duty_us(0) == pytest.approx(us(0.5), abs=0.03))
+
+    def arrived() -> bool:
+        seen.add(graph.duty_us(0))
+        return graph.duty_us(0) == pytest.approx(us(0.5), abs=0.03)
+
+    graph.until(arrived)
     assert len([pulse for pulse in seen if us(0.05) < pulse < us(0.45)]) >= 10
 
 

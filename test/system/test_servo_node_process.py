@@ -1,0 +1,148 @@
+"""servo_node as a process with the shipped YAML: parks on signals, leaves nothing pulsing, refuses broken YAML."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.system
+
+ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / "config"
+PATIENCE_S = 30.0
+
+
+def wait_for(condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S) -> None:
+    deadline_s = time.monotonic() + patience_s
+    while not condition():
+        assert time.monotonic() < deadline_s, f"never: {what}"
+        time.sleep(0.01)
+
+
+class Wires:
+    """A PWM chip in a folder."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        for number in range(3):
+            folder = root / "pwmchip0" / f"pwm{number}"
+            folder.mkdir(parents=True)
+            for name in ("duty_cycle", "period", "enable"):
+                (folder / name).write_text("0\n")
+        (root / "pwmchip0" / "npwm").write_text("3\n")
+
+    def pulse_us(self, channel: int) -> float:
+        folder = self.root / "pwmchip0" / f"pwm{channel}"
+        duty, enabled = ((folder / name).read_text().split() for name in ("duty_cycle", "enable"))
+        return int(duty[0]) / 1000 if duty and enabled == ["1"] else 0.0
+
+
+@pytest.fixture
+def wires(tmp_path: Path) -> Wires:
+    return Wires(tmp_path / "pwm")
+
+
+Start = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def start(wires: Wires, tmp_path: Path, domain_id: int) -> Iterator[Start]:
+    running: list[subprocess.Popen[str]] = []
+
+    def run(*argv: str) -> "subprocess.Popen[str]":
+        process = subprocess.Popen(argv, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        running.append(process)
+        return process
+
+    yield run
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def servo_argv(wires: Wires, *more: str) -> list[str]:
+    return [
+        *(sys.executable, "-m", "vergence_servo.servo_node", "--ros-args"),
+        *("--params-file", str(CONFIG / "servo_node.yaml"), "-p", "backend:=kernel_pwm"),
+        *("-p", f"kernel_pwm.root:={wires.root}", "-p", f"servos:={CONFIG / 'servos.yaml'}"),
+        *("-p", f"pose_file:={wires.root / 'pose.json'}", *more),
+    ]
+
+
+def commander_argv(*arguments: str) -> list[str]:
+    return [sys.executable, str(Path(__file__).with_name("joint_commander.py")), *arguments]
+
+
+def moving_node(start: Start, wires: Wires, *more: str) -> "subprocess.Popen[str]":
+    node = start(*servo_argv(wires, *more))
+    commander = start(*commander_argv("steady", "0.5"))
+    wait_for(lambda: wires.pulse_us(0) == pytest.approx(1818.3, abs=0.1), "the servo follows")
+    commander.send_signal(signal.SIGKILL)
+    return node
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_park_and_release(start: Start, wires: Wires, number: int):
+    node = moving_node(start, wires, "-p", "park_rad:=[0.1,0.0,0.0]", "-p", "release_timeout_s:=0.0")
+    seen: set[float] = set()
+    node.send_signal(number)
+    while node.poll() is None:
+        seen.add(wires.pulse_us(0))
+        time.sleep(0.005)
+    assert node.returncode == 0
+    assert [wires.pulse_us(channel) for channel in range(3)] == [0.0] * 3
+    assert len([pulse for pulse in seen if 1570 < pulse < 1800]) >= 5  # on the way to 0.1 rad, slowly
+    assert json.loads((wires.root / "pose.json").read_text())["pan_left"] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_the_guardian_releases_what_a_killed_node_leaves(start: Start, wires: Wires):
+    node = moving_node(start, wires, "-p", "release_timeout_s:=0.0")
+    node.send_signal(signal.SIGKILL)
+    wait_for(lambda: wires.pulse_us(0) == 0.0, "the guardian releases")
+
+
+def test_without_a_guardian_hardware_goes_on_pulsing_and_the_next_start_stops_it(start: Start, wires: Wires):
+    node = moving_node(start, wires, "-p", "release_timeout_s:=0.0", "-p", "guardian:=false")
+    node.send_signal(signal.SIGKILL)
+    node.wait(PATIENCE_S)
+    time.sleep(0.5)
+    assert wires.pulse_us(0) > 0
+    start(*servo_argv(wires))
+    wait_for(lambda: wires.pulse_us(0) == 0.0, "the next node releases")
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("servo_node: {ros__parameters: {stagger_s: -1.0}}", "stagger_s"),
+        ("servo_node: {ros__parameters: {staggr_s: 1.0}}", "staggr_s"),
+        ("servo_node: {ros__parameters: {backend: gpiozero}}", "11 positions"),
+        ("servo_node: [", ""),
+    ],
+)
+def test_broken_yaml_ends_it_with_one_line(start: Start, tmp_path: Path, text: str, complaint: str):
+    path = tmp_path / "broken.yaml"
+    path.write_text(text + "\n")
+    node = start(sys.executable, "-m", "vergence_servo.servo_node", "--ros-args", "--params-file", str(path))
+    _, errors = node.communicate(timeout=PATIENCE_S)
+    assert node.returncode == 2
+    assert complaint in errors
+    assert "Traceback" not in errors
+
+
+def test_a_bare_start_is_the_fake_and_says_so(start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    node = start(sys.executable, "-m", "vergence_servo.servo_node")
+    assert node.stderr is not None
+    os.set_blocking(node.stderr.fileno(), True)
+    assert "no servo moves" in node.stderr.readline()
+    node.send_signal(signal.SIGINT)
+    node.communicate(timeout=PATIENCE_S)
+    assert node.returncode == 0
