@@ -4,12 +4,13 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from vergence_rig.rig import Rig, default_rig
+from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 from vergence_servo.gaze.controller import GazeController
 from vergence_servo.gaze.fake_head import TICK_S, FakeHead, Seeing
@@ -17,6 +18,8 @@ from vergence_servo.gaze.goals import Goal, GoalKind
 from vergence_servo.gaze.observations import BoxSighting, Observation
 from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.phases import Phase
+from vergence_sim.parameters import SimParameters
+from vergence_sim.simulator import Simulator
 
 Array = npt.NDArray[np.float64]
 
@@ -98,8 +101,6 @@ class Realism:
 
     servo_spread: float = 0.2
     noise_px: float = 0.4
-    roll_deg: float = 0.4
-    vertical_px: float = 4.0
     stamp_error_s: float = 0.003
     box: Mapping[str, float] = field(default_factory=lambda: {"rate_hz": 15.0, "latency_s": 0.04, "noise_px": 1.2})
 
@@ -125,8 +126,6 @@ def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np
         latency_s=setting.latency_ms * 1e-3,
         skew_ticks=int(random.integers(0, 6)),
         noise_px=realism.noise_px,
-        right_roll_rad=math.radians(random.uniform(-realism.roll_deg, realism.roll_deg)),
-        right_vertical_px=random.uniform(-realism.vertical_px, realism.vertical_px),
         stamp_error_s=random.uniform(-realism.stamp_error_s, realism.stamp_error_s),
         track=not boxes,
         fovea=True,
@@ -136,6 +135,39 @@ def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np
         box_noise_px=realism.noise_px if frame_rate else realism.box["noise_px"],
         box_miss_share=0.0 if frame_rate else 0.05,
     )
+
+
+@lru_cache(maxsize=1)
+def _simulator() -> Simulator:
+    """One world serves every run: only where its hinges are set matters, and that is set anew at every look."""
+    return Simulator(SimParameters(), default_rig(), render=False)
+
+
+class SimulatedHead(FakeHead):
+    """The fake head with the lockstep simulator's kinematics and mounts: what is seen and true comes from MuJoCo."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._simulator = _simulator()
+        self._posed_at = math.nan
+
+    def project(self, point_m: Array, left: bool) -> Array:
+        """Return normalised image coordinates (2,) of a point, by the simulator's cameras as they are mounted."""
+        self._pose()
+        camera = self.rig.left_camera if left else self.rig.right_camera
+        x, y = self._simulator.project("left" if left else "right", point_m)
+        return np.array([(x - camera.cx_px) / camera.fx_px, (y - camera.cy_px) / camera.fy_px])
+
+    def true_errors_rad(self) -> Array:
+        """Return (version, vergence, tilt) to the target minus the true ones (3,), by the simulator."""
+        self._pose()
+        vergence, version, tilt = self._simulator.errors_to(self.target(self.time_s))
+        return np.array([version, vergence, tilt])
+
+    def _pose(self) -> None:
+        if self._posed_at != self.time_s:
+            self._simulator.set_head(dict(zip(JOINT_NAMES, self.true_rad.tolist(), strict=True)))
+            self._posed_at = self.time_s
 
 
 def run(
@@ -149,7 +181,7 @@ def run(
     random = np.random.default_rng(scenario.seed + 7919)
     servo = SERVOS[setting.servo]
     rig: Rig = default_rig().with_servos(servo)
-    head = FakeHead(
+    head = SimulatedHead(
         rig,
         scenario.target,
         seeing_of(scenario, setting, realism, random),

@@ -38,6 +38,7 @@ Array = npt.NDArray[np.float64]
 _STILL_SPEED_RAD_S = 0.2
 _ARRIVED_RAD = 0.004
 _STEADY_VERGENCE_RAD = 0.005
+_SWEEPING_RAD_S = 0.6
 _LIMITED_RAD = math.radians(1.0)
 _HOLD_S = 0.3
 _CLOCK_JUMP_S = 1.0
@@ -238,7 +239,11 @@ class GazeController:
         measured = [abs(float(visual.error_rad[i])) for i in judged if self._driven[i]]
         vergence_error = estimate.vergence_rad - float(joints[1] - joints[0])
         error = max([abs(vergence_error), *(value for value in measured if math.isfinite(value))])
-        steady = float(estimate.sigmas_rad[1]) < _STEADY_VERGENCE_RAD and not self._tracking.doubtful
+        # Eyes that sweep across the target are not verged on it; eyes that go along with it are.
+        along = float(np.abs(estimate.rates_rad_s).max()) if estimate.moving else 0.0
+        sweeping = self._history.speed_within(stamp_s - 0.03, stamp_s) > along + _SWEEPING_RAD_S
+        certain = float(estimate.sigmas_rad[1]) < _STEADY_VERGENCE_RAD
+        steady = certain and not sweeping and not self._tracking.doubtful
         self._judge.see_pair(stamp_s, now_s, error, steady, self._is_verging)
 
     def _decide(self, now_s: float, command: Array) -> Array:

@@ -1,7 +1,8 @@
 """How far the target is, and how sure that is.
 
-The shaft of a hobby servo is known only to within its dead band, play and pulse step, so the vergence that the filter
-believes in, however steady, carries that uncertainty; half a degree is 13 cm at one metre.
+The shaft of a hobby servo lies somewhere in its dead band and play; the side it came from tells where, as far as the
+servo is like its data sheet. The vergence that the filter believes in, however steady, carries what is left of that
+doubt: half a degree is 13 cm at one metre.
 """
 
 import math
@@ -17,7 +18,10 @@ from vergence_servo.gaze.target_filter import TargetEstimate
 Array = npt.NDArray[np.float64]
 
 _TO_95_PERCENT = 1.96
-_PLAY_MODEL_SHARE = 0.35
+_PLAY_DOUBT = 0.22 / math.sqrt(3.0)
+"""Dead band and play of a servo are each within a fifth or so of its data sheet; which side it rests on is known."""
+_SHARED_NOISE = 1.8
+"""Estimators that read the same pair share its noise, which the filter takes for independent."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,8 @@ def joint_variances(rig: Rig) -> Array:
     """Return what is not known of each shaft at rest (3,) [rad^2] although its play is modelled."""
     return np.array(
         [
-            (_PLAY_MODEL_SHARE * 0.5 * (servo.dead_band_rad + servo.backlash_rad)) ** 2 + servo.pulse_step_rad**2 / 12.0
+            (_PLAY_DOUBT * 0.5 * math.hypot(servo.dead_band_rad, servo.backlash_rad)) ** 2
+            + servo.pulse_step_rad**2 / 12.0
             for servo in (joint.servo for _, joint in rig.joints.items())
         ]
     )
@@ -47,7 +52,7 @@ def joint_variances(rig: Rig) -> Array:
 def target_position(estimate: TargetEstimate, rig: Rig, shaft_variances: Array) -> TargetPosition:
     """Return the target's position from the filter's estimate and the shafts' variances (3,) [rad^2]."""
     left, right, tilt = shaft_variances
-    covariance = estimate.covariance.copy()
+    covariance = _SHARED_NOISE * estimate.covariance
     covariance[0, 0] += 0.25 * (left + right)
     covariance[1, 1] += left + right
     covariance[0, 1] += 0.5 * (right - left)

@@ -32,7 +32,7 @@ class GazeParameters(Parameters):
         maximum=1,
     )
     still_speed_rad_s: float = parameter(
-        1.4, "eye speed above which images are not used", unit="rad/s", minimum=0.01, maximum=10
+        2.0, "eye speed above which images are not used", unit="rad/s", minimum=0.01, maximum=10
     )
     settle_s: float = parameter(0.02, "rest before an exposure, for it to be used", unit="s", minimum=0, maximum=0.5)
     hold_tolerance_rad: float = parameter(

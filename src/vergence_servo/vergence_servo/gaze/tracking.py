@@ -28,6 +28,7 @@ _TURN_SHARE = 0.35
 _FIRST_SHARE = 0.6
 _FRESH_S = 0.15
 _DISAGREEING_PAIRS = 5
+_SAME_DEPTH_RAD = 0.006
 _SIGMA_BOUNDS_RAD = (1e-5, 0.5)
 _WIDEST_RAD = 1.5
 
@@ -63,6 +64,7 @@ class TargetTracking:
         self._track_offset = (0.0, 0.0)
         self._track_seen_s = -math.inf
         self._wanted_since_s = -math.inf
+        self._target_seen_s = -math.inf
         self._disagreeing = 0
         self._track_vergence: tuple[float, float, float] = (-math.inf, math.nan, 0.0)
 
@@ -174,8 +176,18 @@ class TargetTracking:
             return False  # the tracker measures the target itself; the fovea only whatever lies there
         joints = self._history.shaft_at(sighting.stamp_s)
         seen = np.array([math.nan, joints[0] + vergence, math.nan])
-        tracked = self._track_id is not None
-        return self._believe(measurement, seen, sighting.skew_s, now_s, "fovea", may_jump=not tracked)
+        established = self._track_id is not None or self.class_name is not None
+        if established and not self._still_at_its_depth(vergence, sighting.stamp_s, now_s):
+            self.note = "something at another depth lies at the fovea"
+            return False
+        return self._believe(measurement, seen, sighting.skew_s, now_s, "fovea", may_jump=not established)
+
+    def _still_at_its_depth(self, vergence_rad: float, stamp_s: float, now_s: float) -> bool:
+        """Tell whether the fovea's vergence may be that of a target that was itself seen: not if something hides it."""
+        if now_s - self._target_seen_s < _FRESH_S:
+            return True
+        estimate = self.estimate(stamp_s)
+        return estimate is not None and abs(vergence_rad - estimate.vergence_rad) < _SAME_DEPTH_RAD
 
     def see_box(self, sighting: BoxSighting, now_s: float) -> bool:
         """Take a detected target; True if it is of the wanted class and was believed."""
@@ -230,6 +242,8 @@ class TargetTracking:
         error_rad = seen_rad - np.array([at_left[0], at_right[1], at_left[2]])
         self.visual = VisualError(measurement.stamp_s, seen_rad, error_rad)
         self.seen_s, self.source, self.note = now_s, source, ""
+        if source != "fovea":
+            self._target_seen_s = now_s
         return True
 
     def _start_from(self, measurement: Measurement) -> None:
