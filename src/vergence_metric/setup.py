@@ -8,7 +8,7 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/vergence_metric"]),
         ("share/vergence_metric", ["package.xml"]),
     ],
-    package_data={"vergence_metric": ["py.typed"]},
+    package_data={"vergence_metric": ["py.typed", "models/*.onnx", "models/*.md"]},
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="Vergence maintainers",

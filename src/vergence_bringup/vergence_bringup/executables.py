@@ -15,6 +15,7 @@ class Executable:
 
 
 EXECUTABLES: dict[str, Executable] = {
+    "box_metric_node": Executable("vergence_metric", (("", "vergence_metric.box_parameters:BoxMetricNodeParameters"),)),
     "camera_node": Executable("vergence_camera", (("", "vergence_camera.parameters:CameraParameters"),)),
     "edge_metric_node": Executable(
         "vergence_metric", (("", "vergence_metric.edge_node_parameters:EdgeMetricNodeParameters"),)

@@ -193,7 +193,7 @@ def test_a_dynamic_input_gets_whole_strides(onnx_model):
 
 
 def test_a_device_that_is_not_there(onnx_model):
-    with pytest.raises(DetectorError, match="device is 'coreml': this onnxruntime has .*cpu"):
+    with pytest.raises(DetectorError, match=r"device is 'coreml': this onnxruntime has .*cpu"):
         load(onnx_model("yolov6"), device="coreml")
 
 

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from vergence_metric.box_parameters import BoxMetricParameters
 from vergence_metric.boxes.appearance import likeness, signature
 from vergence_metric.boxes.detections import Box
-from vergence_metric.boxes.pair_geometry import PairGeometry
+from vergence_metric.boxes.pair_geometry import PairGeometry, Pixel
 
 _SIZE_SIGMA = 0.12
 _SIZE_FLOOR_PX = 2.0
 _UNLIKE_SIGMA = 0.2
 _SCORE_SIGMA = 0.5
+_MOVED_SIGMA_PX = 12.0
 _DIVERGING_PX = 12.0  # servos without feedback are off by about as much
 
 
@@ -31,6 +32,15 @@ class BoxPair:
     right: Box
     cost: float
     ambiguous: bool
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Where an object of a class should be seen by each eye, by what was seen before; None where that is unknown."""
+
+    class_id: int
+    left_px: Pixel | None
+    right_px: Pixel | None
 
 
 @dataclass(frozen=True)
@@ -49,6 +59,7 @@ def associate(
     vertical_px: float = 0.0,
     images: tuple[NDArray[Any], NDArray[Any]] | None = None,
     geometry: PairGeometry | None = None,
+    expected: Expected | None = None,
 ) -> Association:
     """Pair the boxes of two images so that all of them together fit best.
 
@@ -59,6 +70,7 @@ def associate(
         vertical_px: y_left - y_right that the mounts give every object.
         images: both images, to compare what the boxes hold; None compares places and sizes only.
         geometry: where the other eye can see what one eye sees; None takes rows for epipolar lines.
+        expected: where the target was, None if that is not known.
 
     """
     signatures: tuple[list[Any], list[Any]] = ([None] * len(left), [None] * len(right))
@@ -69,6 +81,7 @@ def associate(
         for j, b in enumerate(right):
             cost = _cost(a, b, parameters, vertical_px, geometry)
             if math.isfinite(cost):
+                cost += _discontinuity(a, b, expected, parameters.follow_gate_px)
                 alike = likeness(signatures[0][i], signatures[1][j])
                 costs[i, j] = cost + (0.0 if alike is None else ((1.0 - alike) / _UNLIKE_SIGMA) ** 2)
     chosen = _best_together(costs)
@@ -114,6 +127,16 @@ def _cost(a: Box, b: Box, p: BoxMetricParameters, vertical_px: float, geometry: 
         sigma = math.hypot(_SIZE_SIGMA * (2.0 - side), _SIZE_FLOOR_PX / min(sizes))
         cost += min((stretch / sigma) ** 2, 9.0)
     return cost + ((a.score - b.score) / _SCORE_SIGMA) ** 2
+
+
+def _discontinuity(a: Box, b: Box, expected: Expected | None, gate_px: float) -> float:
+    """Return the squared deviation from having moved alike in both eyes, for boxes where the target was."""
+    if expected is None or expected.left_px is None or expected.right_px is None or a.class_id != expected.class_id:
+        return 0.0
+    moved = np.subtract(a.center_px, expected.left_px), np.subtract(b.center_px, expected.right_px)
+    if min(float(np.hypot(*m)) for m in moved) > gate_px:
+        return 0.0
+    return min((float(np.hypot(*(moved[0] - moved[1]))) / _MOVED_SIGMA_PX) ** 2, 9.0)
 
 
 def _vertical_misfit(a: Box, b: Box, vertical_px: float) -> float:

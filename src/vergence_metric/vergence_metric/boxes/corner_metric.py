@@ -36,7 +36,7 @@ class CornerMetric:
 def corner_metric(left: Box, right: Box, hidden: tuple[bool, bool, bool, bool] = (False,) * 4) -> CornerMetric:
     """Measure a pair; `hidden` names sides (left, top, right, bottom) that something covers in one eye."""
     trusted = [not (a or b or c) for a, b, c in zip(left.cut, right.cut, hidden, strict=True)]
-    difference = np.subtract(left.xyxy_px, right.xyxy_px)
+    difference = np.subtract(left.xyxy_px, right.xyxy_px, dtype=np.float64)
     difference[[not good for good in trusted]] = math.nan
     # A centre needs both its sides: NaN passes through the mean.
     center = np.array([difference[[LEFT, RIGHT]].mean(), difference[[TOP, BOTTOM]].mean()])

@@ -75,8 +75,12 @@ class Detector:
 
     def set_parameters(self, parameters: DetectorParameters) -> None:
         """Take changed thresholds and classes; raises ModelClassError for classes the model does not have."""
-        self._wanted = _class_ids(parameters.classes, self.class_names)
+        self._wanted = self.class_ids(parameters.classes)
         self._parameters = parameters
+
+    def class_ids(self, wanted: tuple[str, ...]) -> NDArray[np.int64] | None:
+        """Return the numbers of classes given by name or number, None for none; raises ModelClassError."""
+        return _class_ids(wanted, self.class_names)
 
     def detect(self, image: NDArray[Any]) -> Detections:
         """Return the objects in an image (h, w, 3) BGR or (h, w) grey uint8; raises DetectorImageError for others."""

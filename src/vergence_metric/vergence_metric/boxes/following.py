@@ -1,13 +1,12 @@
 """Which of several objects is the target: the one it was, as long as it is seen; else the best one in view."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from vergence_metric.box_parameters import BoxMetricParameters
-from vergence_metric.boxes.association import Association, BoxPair
+from vergence_metric.boxes.association import Association, BoxPair, Expected
 from vergence_metric.boxes.detections import Box
 from vergence_metric.boxes.pair_geometry import PairGeometry, Pixel
 
@@ -44,7 +43,7 @@ class TargetMemory:
         self, found: Association, stamp_s: float, image_size_px: tuple[int, int], geometry: PairGeometry | None
     ) -> Choice:
         """Return the target among what was found, and remember it."""
-        expected = self._expected(stamp_s, geometry)
+        expected = self.expected(stamp_s, geometry)
         if expected is None:
             choice = _best(found, image_size_px)
         else:
@@ -52,26 +51,8 @@ class TargetMemory:
         self._remember(choice, stamp_s, geometry)
         return choice
 
-    def confirms(self, pair: BoxPair, found: Association, stamp_s: float, geometry: PairGeometry | None) -> bool:
-        """Tell whether where the target was in both eyes speaks for this pair against every other box of its class.
-
-        To be asked before `choose`, which remembers anew.
-        """
-        expected = self._expected(stamp_s, geometry)
-        if expected is None or expected[0] is None or expected[1] is None:
-            return False
-        sides: list[tuple[Box, Pixel, Iterable[Box]]] = [
-            (pair.left, expected[0], [p.left for p in found.pairs] + list(found.left_only)),
-            (pair.right, expected[1], [p.right for p in found.pairs] + list(found.right_only)),
-        ]
-        for own, place, all_boxes in sides:
-            distance = math.dist(own.center_px, place)
-            others = [math.dist(b.center_px, place) for b in all_boxes if b is not own and b.class_id == own.class_id]
-            if distance > self.parameters.follow_gate_px or 2.0 * distance > min(others, default=math.inf):
-                return False
-        return True
-
-    def _expected(self, stamp_s: float, geometry: PairGeometry | None) -> tuple[Pixel | None, Pixel | None] | None:
+    def expected(self, stamp_s: float, geometry: PairGeometry | None) -> Expected | None:
+        """Return where the target should be seen now if it rests in the world; None where it is forgotten."""
         seen = self._seen
         if seen is None or not 0.0 <= stamp_s - seen.stamp_s <= self.parameters.forget_s:
             return None
@@ -81,15 +62,15 @@ class TargetMemory:
                 moved = geometry.pixel(eye == 0, direction)
                 place = moved if math.isfinite(moved[0]) else None
             places.append(place)
-        return places[0], places[1]
+        return Expected(seen.class_id, places[0], places[1])
 
-    def _same(self, found: Association, expected: tuple[Pixel | None, Pixel | None]) -> Choice:
-        gate, class_id = self.parameters.follow_gate_px, self._seen.class_id if self._seen else -1
+    def _same(self, found: Association, expected: Expected) -> Choice:
+        gate, class_id = self.parameters.follow_gate_px, expected.class_id
 
         def off(boxes: tuple[Box | None, Box | None]) -> float:
             distances = [
                 math.dist(box.center_px, place)
-                for box, place in zip(boxes, expected, strict=True)
+                for box, place in zip(boxes, (expected.left_px, expected.right_px), strict=True)
                 if box is not None and place is not None
             ]
             return float(np.mean(distances)) if distances else math.inf
@@ -103,6 +84,8 @@ class TargetMemory:
     def _remember(self, choice: Choice, stamp_s: float, geometry: PairGeometry | None) -> None:
         left = choice.pair.left if choice.pair else choice.left
         right = choice.pair.right if choice.pair else choice.right
+        if choice.pair is not None and choice.pair.ambiguous:
+            right = None  # a guess must not become the past that settles the next one
         shown = left or right
         if shown is None:
             if self._seen is not None and not 0.0 <= stamp_s - self._seen.stamp_s <= self.parameters.forget_s:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.box_parameters import BoxMetricNodeParameters
-from vergence_metric.boxes.association import Association, BoxPair, associate
+from vergence_metric.boxes.association import BoxPair, associate
 from vergence_metric.boxes.corner_metric import corner_metric, hidden_sides
 from vergence_metric.boxes.detections import Box, Detections
 from vergence_metric.boxes.detector import Detector
@@ -97,8 +97,8 @@ class BoxMeasurement:
         """Return metric II of what was detected in a pair; see `measure`."""
         p = self._parameters
         geometry = PairGeometry(*models, eyes) if models is not None and eyes is not None else None
-        found = associate(seen[0].boxes(), seen[1].boxes(), p, self._vertical_px, images, geometry)
-        found = self._settle(found, stamp_s, geometry)
+        expected = self._memory.expected(stamp_s, geometry)
+        found = associate(seen[0].boxes(), seen[1].boxes(), p, self._vertical_px, images, geometry, expected)
         choice = self._memory.choose(found, stamp_s, seen[0].image_size_px, geometry)
         if choice.pair is None:
             self._filter.reset()
@@ -113,16 +113,6 @@ class BoxMeasurement:
                 reason="another box of this class fits about as well",
             )
         return self._paired(choice.pair, images, seen, stamp_s, geometry, models)
-
-    def _settle(self, found: Association, stamp_s: float, geometry: PairGeometry | None) -> Association:
-        """Clear up ambiguous pairs that the past decides."""
-        pairs = [
-            replace(pair, ambiguous=False)
-            if pair.ambiguous and self._memory.confirms(pair, found, stamp_s, geometry)
-            else pair
-            for pair in found.pairs
-        ]
-        return replace(found, pairs=tuple(pairs))
 
     def _one_eyed(
         self, choice: Choice, seen: tuple[Detections, Detections], models: Models | None

@@ -1,0 +1,244 @@
+"""Which boxes are one object's, which object is the target, and what its corners say."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vergence_metric.box_parameters import BoxMetricParameters
+from vergence_metric.boxes.appearance import likeness, signature
+from vergence_metric.boxes.association import _best_together, associate
+from vergence_metric.boxes.corner_metric import corner_metric, hidden_sides
+from vergence_metric.boxes.detections import Box
+from vergence_metric.boxes.following import TargetMemory
+from vergence_metric.boxes.pair_geometry import PairGeometry
+from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import EyeAngles, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.rig import default_rig
+
+P = BoxMetricParameters()
+SIZE = (640, 480)
+CUT_LEFT, CUT_TOP, CUT_RIGHT, CUT_BOTTOM = ((i == 0, i == 1, i == 2, i == 3) for i in range(4))
+
+
+def box(x, y, width=60.0, height=60.0, score=0.8, class_id=0, cut=(False,) * 4):
+    xyxy = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
+    return Box(xyxy, score, class_id, f"class{class_id}", cut)
+
+
+def geometry(eyes=None):
+    rig = default_rig()
+    return PairGeometry(CameraModel(rig.left_camera), CameraModel(rig.right_camera), eyes or EyeAngles(0.0, 0.0, 0.0))
+
+
+def test_the_best_score_is_not_the_partner():
+    left = [box(300, 200)]
+    right = [box(280, 320, score=0.99), box(270, 203, score=0.4)]
+    found = associate(left, right, P)
+    assert [(p.left, p.right) for p in found.pairs] == [(left[0], right[1])]
+    assert found.right_only == (right[0],)
+    assert not found.pairs[0].ambiguous
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        box(270, 200, class_id=1),
+        box(270, 240),
+        box(270, 200, height=120),
+        box(-60, 200),
+    ],
+    ids=["class", "row", "height", "disparity"],
+)
+def test_what_cannot_be_one_object_is_no_pair(other):
+    left = box(300, 200)
+    found = associate([left], [other], P)
+    assert found.pairs == ()
+    assert found.left_only == (left,)
+    assert found.right_only == (other,)
+
+
+def test_mounts_vertical_offset_is_allowed_for():
+    left, right = box(300, 200), box(270, 175)
+    assert not associate([left], [right], P).pairs
+    assert associate([left], [right], P, vertical_px=25.0).pairs
+
+
+def test_alike_boxes_that_fit_as_well_are_ambiguous():
+    found = associate([box(300, 200)], [box(270, 200), box(200, 201)], P)
+    assert len(found.pairs) == 1
+    assert found.pairs[0].ambiguous
+
+
+def test_what_the_boxes_hold_settles_it():
+    rng = np.random.default_rng(2)
+    patches = rng.integers(0, 255, (2, 60, 60, 3)).astype(np.uint8)
+    images = [np.full((480, 640, 3), 90, np.uint8) for _ in range(2)]
+    places = ((300, 420), (180, 250))
+    for image, xs, order in ((images[0], places[0], (0, 1)), (images[1], places[1], (0, 1))):
+        for x, number in zip(xs, order, strict=True):
+            image[170:230, x - 30 : x + 30] = patches[number]
+    # The right eye is brighter and bluer.
+    images[1] = np.clip(images[1] * np.array([0.7, 0.9, 0.8]) + 20, 0, 255).astype(np.uint8)
+    left = [box(x - 0.5, 199.5) for x in places[0]]
+    right = [box(x - 0.5, 199.5) for x in reversed(places[1])]
+    found = associate(left, right, P, images=(images[0], images[1]))
+    assert {(p.left.center_px[0], p.right.center_px[0]) for p in found.pairs} == {(299.5, 179.5), (419.5, 249.5)}
+    assert not any(p.ambiguous for p in found.pairs)
+    same = likeness(signature(images[0], left[0]), signature(images[1], right[1]))
+    assert same is not None
+    assert same > 0.95
+
+
+def test_nothing_lies_beyond_infinity():
+    parallel = geometry()
+    assert parallel.parallel_px((300.0, 200.0)) == pytest.approx(0.0, abs=1e-9)
+    far = [box(270, 200)], [box(300, 200)]
+    assert not associate(*far, P, geometry=parallel).pairs
+    converged = geometry(EyeAngles(-0.1, 0.1, 0.0))
+    assert converged.parallel_px((319.5, 239.5)) == pytest.approx(-539 * math.tan(0.2), rel=1e-6)
+    assert associate(*far, P, geometry=converged).pairs
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.floats(0.25, 3.0), st.floats(-0.25, 0.25), st.floats(-0.2, 0.2), st.floats(-0.3, 0.3), st.floats(0.01, 0.3),
+    st.floats(-0.3, 0.3),
+)  # fmt: skip
+def test_epipolar_lines_pass_where_points_are_seen(distance, y, z, version, vergence, tilt):
+    """A point projected with nothing but rotations lies on the line that the geometry names."""
+    eyes = EyeAngles(version - vergence / 2, version + vergence / 2, tilt)
+    setup = geometry(eyes)
+    point = np.array([distance, distance * y, distance * z])
+    pixels = []
+    for left_eye, pan in ((True, eyes.pan_left_rad), (False, eyes.pan_right_rad)):
+        origin = np.array([0.0, 0.0325 if left_eye else -0.0325, 0.0])
+        local = rotation_rig_from_optical(pan, tilt).T @ (point - origin)
+        if local[2] < 0.05:
+            return
+        pixels.append((319.5 + 539 * local[0] / local[2], 239.5 + 539 * local[1] / local[2]))
+    (ul, vl), (ur, vr) = pixels
+    assert setup.vertical_px((ul, vl), ur) == pytest.approx(vl - vr, abs=1e-6)
+    assert ul - ur >= setup.parallel_px((ul, vl)) - 1e-6
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.integers(0, 5), st.integers(0, 5), st.integers(0, 2**32 - 1))
+def test_the_pairing_is_the_best_of_all(rows, columns, seed):
+    rng = np.random.default_rng(seed)
+    costs = rng.uniform(0, 10, (rows, columns))
+    costs[rng.random((rows, columns)) < 0.4] = math.inf
+    chosen = _best_together(costs)
+    assert len({i for i, _ in chosen}) == len({j for _, j in chosen}) == len(chosen)
+    best = (0, 0.0)
+    for count in range(min(rows, columns), 0, -1):
+        sums = [
+            sum(costs[i, j] for i, j in zip(some, order, strict=True))
+            for some in itertools.combinations(range(rows), count)
+            for order in itertools.permutations(range(columns), count)
+        ]
+        finite = [s for s in sums if math.isfinite(s)]
+        if finite:
+            best = (count, min(finite))
+            break
+    assert len(chosen) == best[0]
+    assert sum(costs[i, j] for i, j in chosen) == pytest.approx(best[1])
+
+
+def test_corner_differences_both_ways():
+    metric = corner_metric(Box((100, 50, 160, 110), 0.9, 0, "cube"), Box((88, 49, 150, 110), 0.8, 0, "cube"))
+    np.testing.assert_allclose(metric.left_minus_right_px, [12, 1, 10, 0])
+    np.testing.assert_allclose(metric.right_minus_left_px, [-12, -1, -10, 0])
+    np.testing.assert_allclose(metric.center_px, [11, 0.5])
+    assert metric.size_ratio == pytest.approx(62 / 60)
+
+
+def test_a_cut_side_is_nan_and_the_others_stay():
+    cut = Box((-0.5, 50, 60, 110), 0.9, 0, "cube", CUT_LEFT)
+    metric = corner_metric(Box((20, 50, 80, 111), 0.9, 0, "cube"), cut)
+    assert math.isnan(metric.left_minus_right_px[0])
+    np.testing.assert_allclose(metric.left_minus_right_px[1:], [0, 20, 1])
+    assert math.isnan(metric.center_px[0])
+    assert metric.center_px[1] == pytest.approx(0.5)
+    assert math.isnan(metric.size_ratio)
+    assert metric.trusted == (False, True, True, True)
+
+
+@pytest.mark.parametrize(
+    ("disparity", "expected"),
+    [(10.0, (False, False, True, False)), (30.0, (True, False, False, False)), (math.nan, (True, False, True, False))],
+)
+def test_the_side_that_disagrees_is_the_hidden_one(disparity, expected):
+    whole, narrow = Box((100, 50, 160, 110), 0.9, 0, "c"), Box((90, 50, 130, 110), 0.9, 0, "c")
+    # Left sides differ by 10, right ones by 30.
+    assert hidden_sides(whole, narrow, 1.25, disparity, 0.0) == expected
+    assert hidden_sides(whole, replace(narrow, xyxy_px=(90, 50, 145, 110)), 1.25, disparity, 0.0) == (False,) * 4
+
+
+def choose(memory, left, right, stamp_s, setup=None):
+    return memory.choose(associate(left, right, P, geometry=setup), stamp_s, SIZE, setup)
+
+
+def test_the_target_stays_the_target():
+    memory = TargetMemory(P)
+    first, second = [box(200, 200, score=0.9), box(450, 300, score=0.6)], [box(180, 200, score=0.9), box(430, 300, 60)]
+    assert choose(memory, first[:1], second[:1], 0.0).pair.left is first[0]
+    stronger = box(452, 300, score=0.99)
+    found = choose(memory, [box(205, 200, score=0.5), stronger], second, 0.1)
+    assert found.pair.left.center_px[0] == 205
+    # Gone for a moment: nothing else is taken for it, and then something is.
+    assert choose(memory, [stronger], second[1:], 0.2).pair is None
+    assert choose(memory, [stronger], second[1:], 0.1 + P.forget_s + 0.01).pair.left is stronger
+
+
+def test_the_target_is_known_again_though_the_eyes_turned():
+    memory = TargetMemory(P)
+    choose(memory, [box(419.5, 239.5)], [box(419.5, 239.5)], 0.0, geometry())
+    turned = geometry(EyeAngles(-0.2, -0.2, 0.0))
+    there = turned.pixel(True, geometry().direction(True, (419.5, 239.5)))
+    assert there[0] < 320
+    same, decoy = box(*there), box(419.5, 239.5, score=0.99)
+    found = choose(memory, [decoy, same], [replace(decoy), replace(same)], 0.1, turned)
+    assert found.pair.left is same
+
+
+def test_one_eye_blind():
+    memory = TargetMemory(P)
+    seen = box(300, 200)
+    assert choose(memory, [seen], [], 0.0).left is seen
+    assert choose(TargetMemory(P), [], [seen], 0.0).right is seen
+    nothing = choose(TargetMemory(P), [], [], 0.0)
+    assert nothing.pair is None
+    assert nothing.left is None
+    assert nothing.right is None
+
+
+def test_the_past_settles_an_ambiguous_pair():
+    memory = TargetMemory(P)
+    choose(memory, [box(300, 200)], [box(200, 200)], 0.0)
+    boxes = [box(302, 200)], [box(272, 200), box(202, 201)]
+    assert associate(*boxes, P).pairs[0].ambiguous
+    settled = associate(*boxes, P, expected=memory.expected(0.05, None)).pairs[0]
+    assert settled.right.center_px[0] == 202
+    assert not settled.ambiguous
+    assert memory.expected(5.0, None) is None
+
+
+def test_a_guess_does_not_become_the_past():
+    memory = TargetMemory(P)
+    found = associate([box(300, 200)], [box(270, 200), box(200, 201)], P)
+    assert found.pairs[0].ambiguous
+    memory.choose(found, 0.0, SIZE, None)
+    expected = memory.expected(0.1, None)
+    assert expected is not None
+    assert expected.left_px == (300, 200)
+    assert expected.right_px is None
+
+
+def test_gaze_geometry_of_a_fixated_point_has_no_disparity():
+    eyes = gaze_for_point((0.5, 0.05, -0.1), 0.065)
+    assert geometry(eyes).vertical_px((319.5, 239.5), 319.5) == pytest.approx(0.0, abs=1e-9)

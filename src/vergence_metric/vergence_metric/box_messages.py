@@ -1,0 +1,120 @@
+"""Results of metric II as messages."""
+
+import importlib
+import math
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from std_msgs.msg import Header
+
+from vergence_metric.boxes.detections import Box, Detections
+from vergence_metric.boxes.result import BoxVergenceResult
+from vergence_metric.boxes.target_point import TargetPoint
+from vergence_msgs.msg import BoundingBox, BoxVergence, StereoDetections
+
+POINT_FRAME = "rig_base"
+
+
+def box_message(box: Box | None) -> BoundingBox:
+    """Return a box; all NaN where there is none."""
+    if box is None:
+        nan = math.nan
+        return BoundingBox(x_min_px=nan, y_min_px=nan, x_max_px=nan, y_max_px=nan, score=nan, class_id=-1)
+    x_min, y_min, x_max, y_max = box.xyxy_px
+    return BoundingBox(
+        x_min_px=x_min,
+        y_min_px=y_min,
+        x_max_px=x_max,
+        y_max_px=y_max,
+        score=box.score,
+        class_id=box.class_id,
+        class_name=box.class_name,
+        cut_left=box.cut[0],
+        cut_top=box.cut[1],
+        cut_right=box.cut[2],
+        cut_bottom=box.cut[3],
+    )
+
+
+def box_vergence_message(result: BoxVergenceResult, header: Header, pair_skew_s: float) -> BoxVergence:
+    """Return metric II of a pair; `header` is the left image's."""
+    there, back = (
+        [float(value) for value in values]
+        for values in (result.corners.left_minus_right_px, result.corners.right_minus_left_px)
+    )
+    return BoxVergence(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        left=box_message(result.left),
+        right=box_message(result.right),
+        left_minus_right_top_left_x_px=there[0],
+        left_minus_right_top_left_y_px=there[1],
+        left_minus_right_bottom_right_x_px=there[2],
+        left_minus_right_bottom_right_y_px=there[3],
+        right_minus_left_top_left_x_px=back[0],
+        right_minus_left_top_left_y_px=back[1],
+        right_minus_left_bottom_right_x_px=back[2],
+        right_minus_left_bottom_right_y_px=back[3],
+        center_horizontal_px=result.center_px[0],
+        center_vertical_px=result.center_px[1],
+        center_horizontal_rad=result.center_rad[0],
+        center_vertical_rad=result.center_rad[1],
+        sigma_px=result.sigma_px,
+        refined_horizontal_px=result.refined.horizontal_px,
+        refined_vertical_px=result.refined.vertical_px,
+        refined_confidence=result.refined.confidence,
+        size_ratio=float(result.corners.size_ratio),
+        left_azimuth_rad=result.left_rad[0],
+        left_elevation_rad=result.left_rad[1],
+        right_azimuth_rad=result.right_rad[0],
+        right_elevation_rad=result.right_rad[1],
+        class_name=result.class_name,
+        status=int(result.status),
+        reason=result.reason,
+    )
+
+
+def detections_message(result: BoxVergenceResult, header: Header, pair_skew_s: float) -> StereoDetections:
+    """Return everything seen in both eyes."""
+    return StereoDetections(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        left=[box_message(box) for box in result.left_detections],
+        right=[box_message(box) for box in result.right_detections],
+    )
+
+
+def point_message(point: TargetPoint, header: Header) -> PoseWithCovarianceStamped:
+    """Return where the target is, in rig_base; its orientation is not known and spread over the whole turn."""
+    message = PoseWithCovarianceStamped(header=Header(stamp=header.stamp, frame_id=POINT_FRAME))
+    place = message.pose.pose.position
+    place.x, place.y, place.z = (float(value) for value in point.point_m)
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = point.covariance_m2
+    covariance[3:, 3:] = np.eye(3) * math.pi**2 / 3
+    message.pose.covariance = covariance.ravel()
+    return message
+
+
+def vision_type() -> Any:
+    """Return vision_msgs' Detection2DArray; None where vision_msgs is not installed."""
+    try:
+        return importlib.import_module("vision_msgs.msg").Detection2DArray
+    except ImportError:
+        return None
+
+
+def vision_message(detections: Detections, header: Header) -> Any:
+    """Return one eye's detections as vision_msgs/Detection2DArray; only where `vision_type` is one."""
+    kinds = importlib.import_module("vision_msgs.msg")
+    message = kinds.Detection2DArray(header=header)
+    for box in detections:
+        detection = kinds.Detection2D(header=header)
+        detection.bbox.center.position.x, detection.bbox.center.position.y = box.center_px
+        detection.bbox.size_x, detection.bbox.size_y = box.size_px
+        hypothesis = kinds.ObjectHypothesisWithPose()
+        hypothesis.hypothesis.class_id, hypothesis.hypothesis.score = box.class_name, box.score
+        detection.results.append(hypothesis)
+        message.detections.append(detection)
+    return message
