@@ -175,6 +175,17 @@ def test_follow_takes_the_other_eye_over_and_clips_into_its_own_range(kernel: Fa
     assert "hue" not in values
 
 
+@pytest.mark.parametrize("state", [{"auto_exposure": "Aperture Priority Mode"}, {"white_balance_automatic": True}])
+def test_a_leader_that_is_still_automatic_is_not_followed(
+    kernel: FakeKernel, camera: FakeCamera, state: dict[str, object]
+) -> None:
+    port = ControlPort()
+    attach(port, kernel)
+    with pytest.raises(ControlError, match="set its lock to 'hold'"):
+        port.follow({"gain": 9, **state})
+    assert camera.controls[v4l2.CID_GAIN].value == 16
+
+
 def test_a_camera_without_a_manual_mode_is_followed_as_far_as_it_goes() -> None:
     gain = FakeControl(v4l2.CID_GAIN, "Gain", v4l2.CTRL_INTEGER, 0, 10, 1, 5)
     automatic = FakeControl(v4l2.CID_EXPOSURE_AUTO, "Auto Exposure", v4l2.CTRL_MENU, 0, 3, 1, 3, menu={3: "Aperture"})

@@ -99,10 +99,19 @@ class ControlPort:
 
         Returns:
             The controls that were set, and their values.
+
+        Raises:
+            ControlError: an automatic mode of the leader is still on, so that its values mean nothing yet.
         """
         with self._lock:
             controls = self._present()
             specs = controls.specs()
+            for spec in specs.values():
+                if spec.cid in _AUTOMATIC and leader.get(spec.name, None) not in (None, _manual(spec)):
+                    raise ControlError(
+                        f"the partner's {spec.name} is {leader[spec.name]!r}: its exposure is not fixed yet, set its "
+                        "lock to 'hold'"
+                    )
             present = controls.values()
             changes: dict[str, object] = {}
             for spec in specs.values():
@@ -110,7 +119,7 @@ class ControlPort:
                     continue
                 if spec.cid in _AUTOMATIC:
                     if not spec.is_menu or _AUTOMATIC[spec.cid] in spec.menu:
-                        changes[spec.name] = spec.to_value(_AUTOMATIC[spec.cid])
+                        changes[spec.name] = _manual(spec)
                 elif spec.cid in _LOCKED:
                     changes[spec.name] = _clipped(spec, leader.get(spec.name, present[spec.name]))
             return self.set(changes)
@@ -124,6 +133,11 @@ class ControlPort:
         if self._controls is None:
             raise DisconnectedError("the camera is not connected: its controls cannot be set now")
         return self._controls
+
+
+def _manual(spec: ControlSpec) -> Value:
+    """Return the value that switches an automatic mode off."""
+    return spec.to_value(_AUTOMATIC[spec.cid])
 
 
 def _clipped(spec: ControlSpec, value: object) -> object:

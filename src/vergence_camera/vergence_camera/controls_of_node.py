@@ -29,6 +29,7 @@ class NodeControls:
         self._passive = False
         self._trouble = ""
         self._held_generation = 0
+        self._followed: tuple[int, dict[str, object]] | None = None
         self._attached_s = 0.0
         self._seen_generation = 0
         node.add_on_set_parameters_callback(self._on_set)
@@ -45,7 +46,7 @@ class NodeControls:
     def configure(self, lock: str, lock_after_s: float) -> None:
         """Take over the lock parameters."""
         if lock != self._lock:
-            self._held_generation = 0
+            self._held_generation, self._followed = 0, None
         self._lock, self._lock_after_s = lock, lock_after_s
 
     def update(self) -> None:
@@ -61,8 +62,10 @@ class NodeControls:
 
     def follow(self, leader: Mapping[str, object]) -> None:
         """Take the other eye's exposure and white balance over, if that is asked for and they differ."""
-        if self._lock == "follow" and self._port.attached:
+        state = (self._port.generation, dict(leader))
+        if self._lock == "follow" and self._port.attached and state != self._followed:
             self._take(leader)
+            self._followed = None if self._trouble else state
 
     def report(self) -> Report:
         """Return the diagnostic."""
