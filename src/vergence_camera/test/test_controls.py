@@ -1,5 +1,7 @@
 """Controls over the fake's ioctls: names, ranges, menus, all or nothing, and wanted values that outlive the camera."""
 
+import errno
+
 import pytest
 
 from vergence_camera.control_port import ControlPort
@@ -193,6 +195,17 @@ def test_a_camera_without_a_manual_mode_is_followed_as_far_as_it_goes() -> None:
     port = ControlPort()
     attach(port, kernel)
     assert port.follow({"gain": 7}) == {"gain": 7}
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.EPIPE])
+def test_a_control_that_cannot_be_read_hides_no_other(kernel: FakeKernel, camera: FakeCamera, number: int) -> None:
+    camera.controls[v4l2.CID_GAIN].read_errno = number
+    port = ControlPort()
+    attach(port, kernel)
+    assert set(port.values()) == set(NAMES) - {"gain"}
+    assert "gain" not in port.hold()
+    with pytest.raises(ControlError, match="'gain' cannot be read"):
+        port.set({"gain": 3})
 
 
 def test_a_value_read_while_it_is_unplugged_is_no_crash(kernel: FakeKernel, camera: FakeCamera) -> None:

@@ -120,7 +120,7 @@ class ControlPort:
                 if spec.cid in _AUTOMATIC:
                     if not spec.is_menu or _AUTOMATIC[spec.cid] in spec.menu:
                         changes[spec.name] = _manual(spec)
-                elif spec.cid in _LOCKED:
+                elif spec.cid in _LOCKED and spec.name in present:
                     changes[spec.name] = _clipped(spec, leader.get(spec.name, present[spec.name]))
             return self.set(changes)
 

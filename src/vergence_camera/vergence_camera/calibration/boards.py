@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -110,8 +110,8 @@ class Charuco:
         """See Board."""
         return self.columns - 1, self.rows - 1
 
-    def board(self) -> cv2.aruco.CharucoBoard:
-        """Return OpenCV's own object, which can also draw the board."""
+    def board(self) -> Any:
+        """Return OpenCV's own CharucoBoard, which can also draw the board."""
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.dictionary))
         return cv2.aruco.CharucoBoard((self.columns, self.rows), self.square_m, self.marker_m, dictionary)
 

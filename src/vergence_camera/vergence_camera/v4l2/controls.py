@@ -1,5 +1,6 @@
 """The controls of a camera (exposure, gain, white balance, ...): what there is, and setting several as one."""
 
+import contextlib
 import errno
 import re
 from collections.abc import Iterator, Mapping
@@ -91,8 +92,12 @@ class Controls:
         return spec.to_value(self._read(spec))
 
     def values(self) -> dict[str, Value]:
-        """Return the present value of every control that can be read."""
-        return {name: self.get(spec) for name, spec in self.specs().items()}
+        """Return the present value of every control that can be read; some cameras list ones that cannot."""
+        values = {}
+        for name, spec in self.specs().items():
+            with contextlib.suppress(ControlError):
+                values[name] = self.get(spec)
+        return values
 
     def check(self, changes: Mapping[str, object]) -> dict[str, int]:
         """Return the driver's numbers for `changes`; raise ControlError for the first that is not allowed."""
@@ -207,6 +212,8 @@ class Controls:
         try:
             self._kernel.ioctl(self._descriptor, v4l2.G_CTRL, control)
         except OSError as error:
+            if error.errno in _REFUSALS:
+                raise ControlError(f"control '{spec.name}' cannot be read: {error.strerror}") from error
             raise camera_error(error, f"reading control '{spec.name}'", self._path) from error
         return control.value
 
@@ -214,7 +221,7 @@ class Controls:
         try:
             self._kernel.ioctl(self._descriptor, v4l2.S_CTRL, v4l2.Control(id=spec.cid, value=number))
         except OSError as error:
-            if error.errno in (errno.EINVAL, errno.ERANGE, errno.EACCES, errno.EBUSY, errno.EPERM):
+            if error.errno in _REFUSALS:
                 raise ControlError(
                     f"control '{spec.name}' is {spec.to_value(number)!r}: the camera refuses it ({error.strerror}); "
                     f"allowed is {spec.allowed}"
@@ -222,4 +229,6 @@ class Controls:
             raise camera_error(error, f"setting control '{spec.name}'", self._path) from error
 
 
+# A UVC camera that stalls a control request answers with EPIPE or EIO; the stream is none the worse.
+_REFUSALS = {errno.EINVAL, errno.ERANGE, errno.EACCES, errno.EBUSY, errno.EPERM, errno.EPIPE, errno.EIO}
 _KNOWN_GOVERNORS = {v4l2.CID_EXPOSURE_AUTO, v4l2.CID_AUTO_WHITE_BALANCE, v4l2.CID_AUTOGAIN}

@@ -32,6 +32,7 @@ class FakeControl:
     flags: int = 0
     menu: Mapping[int, str] = field(default_factory=dict)
     governs: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
+    read_errno: int = 0
     value: int = 0
 
     def __post_init__(self) -> None:
@@ -366,7 +367,9 @@ def _query_menu(camera: FakeCamera, _: int, answer: Any) -> None:
 
 
 def _get_control(camera: FakeCamera, _: int, answer: Any) -> None:
-    answer.value = _next_control(camera, answer.id).value
+    control = _next_control(camera, answer.id)
+    _fail_with(control.read_errno)
+    answer.value = control.value
 
 
 def _set_control(camera: FakeCamera, _: int, answer: Any) -> None:
