@@ -11,11 +11,11 @@ from vergence_sim.model_builder import HIDDEN_GROUP, ModelBuilder
 from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.pictures import book_cover, cube_faces, look_alike_faces
 from vergence_sim.room import Room
-from vergence_sim.surfaces import Image, cloth, muted, shaded
+from vergence_sim.surfaces import Image, cloth, shaded
 
 HEAD_HEIGHT_M = 1.15
 CUBE_SIDE_M = 0.057
-MARKER_LENGTH_M, MARKER_RADIUS_M = 0.14, 0.008
+MARKER_LENGTH_M, MARKER_RADIUS_M = 0.14, 0.010
 EXTRA_CUBES = ("cube2", "cube3", "cube4")
 OBJECTS = (*TARGETS, "occluder", *EXTRA_CUBES)
 """What can be put somewhere; the extra cubes only where the room has them."""
@@ -43,12 +43,11 @@ class SceneBuilder(ModelBuilder):
         half = CUBE_SIDE_M / 2
         cube = self._wrapped("cube", cube_faces(np.random.default_rng([self._seed, 2])))
         self.movable("cube", self.shape("box", (0, 0, 0), (half, half, half), cube, name="cube"))
-        barrel = self._wrapped("pen", [_pen_label(np.random.default_rng([self._seed, 3, face])) for face in range(6)])
         radius, length = MARKER_RADIUS_M, MARKER_LENGTH_M
         cap: tuple[float, float, float] = (0.1, 0.15, 0.6)
         self.movable(
             "marker",
-            self.shape("cylinder", (0, 0, -0.12 * length), (radius, 0.38 * length), barrel, name="marker"),
+            *self._barrel(radius, -0.5 * length, 0.26 * length),
             self.shape("cylinder", (0, 0, 0.36 * length), (1.15 * radius, 0.14 * length), cap, name="marker_cap"),
             self.shape(
                 "cylinder", (0, 0, 0.2 * length), (1.18 * radius, 0.02 * length), (0.9, 0.9, 0.88), name="marker_ring"
@@ -59,6 +58,21 @@ class SceneBuilder(ModelBuilder):
             "occluder",
             self.shape("box", (0, 0, 0), (0.01, 0.09, 0.12), self._wrapped("occluder", board), name="occluder"),
         )
+
+    def _barrel(self, radius: float, low: float, high: float) -> list[str]:
+        """Return a pen's barrel from short pieces: a cube map is only fair to a piece as high as it is wide."""
+        pieces = max(1, round((high - low) / (2 * radius)))
+        half = 0.5 * (high - low) / pieces
+        shapes = []
+        for number in range(pieces):
+            name = f"marker{number}"
+            label = self._wrapped(
+                name, [_pen_label(np.random.default_rng([self._seed, 3, number, face])) for face in range(6)]
+            )
+            shapes.append(
+                self.shape("cylinder", (0, 0, low + (2 * number + 1) * half), (radius, half), label, name=name)
+            )
+        return shapes
 
     def crowd(self, extra_cubes: int, look_alikes: int) -> None:
         """Put more Rubik's cubes on the table, and things that share their colours or their pattern."""
@@ -151,14 +165,12 @@ def _named(shapes: str, eye: str) -> str:
 
 
 def _pen_label(rng: np.random.Generator) -> Image:
-    """Return a pen's barrel (128, 128, 3): white, with a blue band, rings and marks down its length."""
+    """Return one side of a piece of a pen's barrel (128, 128, 3): white, with coloured print."""
     barrel = shaded((215, 220, 222), np.zeros((128, 128), np.float32))
-    for _ in range(16):
-        row, depth = int(rng.integers(0, 120)), int(rng.integers(2, 9))
-        barrel[row : row + depth] = [int(v) for v in muted(rng, 20, 200, 50)]
-    for _ in range(10):
-        x, y = rng.integers(8, 110, 2).tolist()
-        barrel[y : y + int(rng.integers(4, 20)), x : x + int(rng.integers(3, 14))] = (150, 60, 20)
+    for _ in range(26):
+        x, y = rng.integers(0, 110, 2).tolist()
+        width, height = rng.integers(10, 40, 2).tolist()
+        barrel[y : y + height, x : x + width] = [int(v) for v in rng.integers(5, 130, 3)]
     return np.minimum(barrel, cloth(rng, (128, 128), (235, 235, 235)))
 
 
