@@ -49,7 +49,7 @@ def test_another_codec_is_recognised(tmp_path: Path) -> None:
     writer.release()
     with path.open("rb") as file:
         header = read_header(file, "xvid.avi")
-    assert header.code == b"XVID"
+    assert header.code in (b"XVID", b"FMP4")  # releases of ffmpeg differ
     assert not header.is_mjpeg
 
 
