@@ -203,7 +203,7 @@ def distance_rows(say: Say) -> list[Row]:
         setting = Setting(servo=servo)
         inside, widths = [], []
         for distance in (0.3, 0.5, 1.0, 1.5):
-            trials = run_all(scenarios.at_distance(25, distance), setting)
+            trials = run_all(scenarios.at_distance(50, distance), setting)
             errors = [abs(trace.distance_m[-1, 0] - distance) / distance for _, trace in trials]
             inside += [trace.distance_m[-1, 1] <= distance <= trace.distance_m[-1, 2] for _, trace in trials]
             widths += [(trace.distance_m[-1, 2] - trace.distance_m[-1, 1]) / distance for _, trace in trials]

@@ -17,10 +17,10 @@ from vergence_servo.gaze.target_filter import TargetEstimate
 
 Array = npt.NDArray[np.float64]
 
-_TO_95_PERCENT = 1.96
+_TO_95_PERCENT = 1.9  # servo errors are bounded: their tails are lighter than a normal distribution has
 _PLAY_DOUBT = 0.22 / math.sqrt(3.0)
 """Dead band and play of a servo are each within a fifth or so of its data sheet; which side it rests on is known."""
-_SHARED_NOISE = 1.8
+_SHARED_NOISE = 1.6
 """Estimators that read the same pair share its noise, which the filter takes for independent."""
 
 

@@ -237,6 +237,9 @@ class TargetTracking:
                 f"{source} differs from the prediction by {math.degrees(self.filter.last_innovation_rad):.1f} deg"
             )
             return False
+        if source == "fovea":
+            # It tells only the depth; where the target lies is what is known of it.
+            seen_rad = np.where(np.isnan(seen_rad), self.filter.at(measurement.stamp_s).joints_rad, seen_rad)
         at_left = self._history.shaft_at(measurement.stamp_s)
         at_right = self._history.shaft_at(measurement.stamp_s + skew_s)
         error_rad = seen_rad - np.array([at_left[0], at_right[1], at_left[2]])

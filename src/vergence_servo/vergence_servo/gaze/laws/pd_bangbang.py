@@ -38,6 +38,7 @@ class PdBangbangLaw:
         self._stamp_s = -math.inf
         self._before = self._slope = np.zeros(3)
         self._landing: Array | None = None
+        self._landed_s = -math.inf
 
     def wanted(self, view: LawView) -> Array:
         """Return the joint angles (3,) to command."""
@@ -45,7 +46,8 @@ class PdBangbangLaw:
             if self._landing is None:
                 self._landing = view.target.at(view.target.time_s).joints_rad
             return np.where(view.driven, view.goal(self._landing), np.nan)
-        self._landing = None
+        if self._landing is not None:
+            self._landing, self._landed_s = None, view.now_s
         errors = self._errors(view)
         gains = np.array([_GAZE_GAIN, _VERGENCE_GAIN, _GAZE_GAIN])
         dampings = np.array([_GAZE_DAMPING, _VERGENCE_DAMPING, _GAZE_DAMPING])
@@ -63,7 +65,8 @@ class PdBangbangLaw:
     def _errors(self, view: LawView) -> Array:
         """Return version, vergence and tilt error (3,) of the last image; 0 where it did not tell, or is too old."""
         visual = view.visual
-        if visual is None or view.now_s - visual.stamp_s > _STALE_S:
+        # What was seen before the landing is of the eyes as they were.
+        if visual is None or visual.stamp_s <= self._landed_s or view.now_s - visual.stamp_s > _STALE_S:
             self._slope = np.zeros(3)
             return np.zeros(3)
         left, right, tilt = visual.error_rad

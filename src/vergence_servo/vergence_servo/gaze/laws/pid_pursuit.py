@@ -16,10 +16,11 @@ from vergence_servo.gaze.parameters import GazeParameters
 Array = npt.NDArray[np.float64]
 
 # version, vergence, tilt
-_PROPORTIONAL = np.array([4.5, 4.0, 4.5])
-_INTEGRAL = np.array([4.0, 1.5, 4.0])
-_DERIVATIVE = np.array([0.12, 0.08, 0.12])
+_PROPORTIONAL = np.array([3.5, 3.5, 3.5])
+_INTEGRAL = np.array([2.5, 1.0, 2.5])
+_DERIVATIVE = np.array([0.1, 0.05, 0.1])
 _LARGEST_INTEGRAL_RAD = 0.25
+_INTEGRATED_RAD = math.radians(4.0)
 _STALE_S = 0.3
 
 
@@ -66,6 +67,7 @@ class PidPursuitLaw:
         interval_s = visual.stamp_s - self._stamp_s
         if interval_s < _STALE_S:
             self._slope = (errors - self._errors) / interval_s
-            integral = self._integral + errors * interval_s
+            # A jump is not a speed: large errors are left to the proportional part.
+            integral = self._integral + np.where(np.abs(errors) < _INTEGRATED_RAD, errors, 0.0) * interval_s
             self._integral = np.clip(integral, -_LARGEST_INTEGRAL_RAD, _LARGEST_INTEGRAL_RAD)
         self._errors, self._stamp_s = errors, visual.stamp_s
