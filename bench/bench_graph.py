@@ -50,8 +50,9 @@ def run(say: Callable[[str], None]) -> list[Row]:
         apart = "equal stamps" if not skew_ns else f"{skew_ns / 1e6:.0f} ms apart"
         say(f"{apart}: {seconds} s, then the default profile")
         ours = measure(skew_ns, seconds, shipped_profile=True)
-        for stage, value in ours.stages.items():
-            say(f"  {stage}: {value}")
+        medians = {n: float(v) for n, v in ours.stages.items() if n.endswith("_median_ms")}
+        say("  medians [ms]: " + ", ".join(f"{n.removesuffix('_median_ms')} {v:.2f}" for n, v in medians.items()))
+        say(f"  {ours.stages['measured']} pairs measured, {ours.stages['dropped']} left out")
         default = measure(skew_ns, default_seconds, shipped_profile=False)
         peer = "default transport profile"
         rows += [
