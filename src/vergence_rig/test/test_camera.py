@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from vergence_rig.camera import CameraError, CameraModel
 from vergence_rig.rig import CameraSpec
 

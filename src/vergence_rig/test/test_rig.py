@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 
 import pytest
+
 from vergence_rig.rig import JOINT_NAMES, JointSpec, Rig, RigError, default_rig, load_rig, rig_from_mapping
 from vergence_rig.servo import IDEAL, MG995, SG90
 

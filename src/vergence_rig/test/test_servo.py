@@ -5,6 +5,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from vergence_rig.servo import IDEAL, MG995, PRESETS, SG90, ServoPlant, ServoSpec
 
 DEG = math.pi / 180
