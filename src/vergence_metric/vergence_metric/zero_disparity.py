@@ -34,7 +34,7 @@ class ZeroDisparity:
 
     `mask` (h, w) bool covers an area of the left image whose top-left pixel is `origin_px`. `centroid_px` (x, y) and
     `extent_px` (width and height of the rectangle that spreads alike) are in the left image, NaN if there is no region.
-    `features` counts the pixels that passed, `touches_border` tells that the region may reach beyond the area looked at.
+    `features` counts the pixels that passed, `touches_border` that the region may reach beyond what was looked at.
     """
 
     mask: NDArray[np.bool_]

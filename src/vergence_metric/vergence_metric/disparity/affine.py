@@ -6,7 +6,7 @@ together; the normal matrix depends on the left image alone and is factored once
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -25,6 +25,9 @@ _CONVERGED_PX = 0.003
 _LARGEST_STEP_PX = 3.0
 _LARGEST_SHEAR = 0.4
 _SHEAR_FROM_PX = 8.0
+_FLOOR_PX = 0.01  # interpolation, and what no residual shows
+_BLOCK_PX = 7
+_DRIFT_SHARE = 0.7  # what an answer moves by when its window grows, noise does not explain
 _PRIOR_SHEAR = 0.1  # standard deviation of slant and roll between the eyes
 _PRIOR_VERTICAL_PX = 1.0
 
@@ -65,6 +68,9 @@ def grow(
         # The same surface leaves the same residual; another depth in view raises it.
         if best is not None and fit.residual > 1.25 * best.residual + 0.5:
             break
+        if best is not None:
+            drift_px = _DRIFT_SHARE * (fit.horizontal_px - best.horizontal_px)
+            fit = replace(fit, sigma_px=math.hypot(fit.sigma_px, drift_px))
         best, warp = fit, np.column_stack([fit.affine, [-fit.horizontal_px, -fit.vertical_px]])
     return best
 
@@ -145,14 +151,16 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
             break
     residual = seen - np.einsum("i,in->n", solution, design)
     variance = float((weights * residual**2).sum())
-    influence = weights * np.einsum("i,in->n", inverse[0], design)
-    # The blur makes neighbouring residuals alike; the factor is measured (bench row sigma).
-    sigma_px = math.sqrt(variance * float((influence**2).sum())) / gain * 2.0
+    # What is left over is alike in neighbouring pixels (blur, edges, unmodelled depth): its effect is summed in blocks
+    # before it is squared, as in heteroscedasticity and autocorrelation consistent estimates (Newey and West, 1987).
+    effect = (weights * np.einsum("i,in->n", inverse[0], design) * residual).reshape(patch.shape)
+    blocks = cv2.boxFilter(effect, -1, (_BLOCK_PX, _BLOCK_PX), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    noise_px = math.sqrt(float((blocks**2).sum()) / _BLOCK_PX**2) / gain
     total = gain**2 * signal + variance
     return Fit(
         -float(homogeneous[0, 2]),
         -float(homogeneous[1, 2]),
-        sigma_px,
+        math.hypot(noise_px, _FLOOR_PX),
         math.sqrt(variance),
         math.sqrt(max(1.0 - variance / total, 0.0)),
         sigma,
