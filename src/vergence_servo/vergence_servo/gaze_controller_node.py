@@ -43,7 +43,7 @@ class GazeNodeParameters(GazeParameters):
 
     rig: str = parameter("", "path of rig.yaml; empty for the built-in rig", read_only=True)
     control_rate_hz: float = parameter(
-        100.0, "control cycles a second", unit="Hz", minimum=5, maximum=1000, read_only=True
+        50.0, "control cycles a second", unit="Hz", minimum=5, maximum=1000, read_only=True
     )
 
 

@@ -11,7 +11,7 @@ from vergence_sim.real_time import Schedule
 
 
 def _exposures(schedule, until_s, late_s=0.0):
-    times = {"left": [], "right": []}
+    times: dict[str, list[float]] = {"left": [], "right": []}
     while schedule.next_due_s() < until_s:
         due = schedule.next_due_s()
         event = schedule.pop(due + late_s)

@@ -119,7 +119,7 @@ class SimParameters(Parameters):
     station_s: float = parameter(2.0, "of motion stations: time at each", unit="s", minimum=0.01, maximum=3600)
     rig_yaw_rate_rad_s: float = parameter(0.0, "the whole rig turns", unit="rad/s", minimum=-5, maximum=5)
 
-    joint_rate_hz: float = parameter(100.0, "of joint_states", unit="Hz", minimum=1, maximum=1000, read_only=True)
+    joint_rate_hz: float = parameter(50.0, "of joint_states", unit="Hz", minimum=1, maximum=1000, read_only=True)
 
     def check(self) -> None:
         """Hold the stations to whole triples."""
