@@ -2,6 +2,7 @@
 # make test   every test
 # make lint   ruff format and lint, mypy
 # make bench  every benchmark (ONLY=name for one), results in out/bench
+# make study  docs/metric_study.md anew, from the simulator
 # make setup  only the environment and the build
 # All of them make .venv and install/ first, or find them ready.
 SHELL := /bin/bash
@@ -25,6 +26,9 @@ lint: setup-dev
 
 bench: setup-dev
 	@source env.sh && exec python -m bench $(if $(ONLY),--only $(ONLY))
+
+study: setup-dev
+	@source env.sh && exec python tools/metric_study.py
 
 clean:
 	rm -rf .venv build install log out
