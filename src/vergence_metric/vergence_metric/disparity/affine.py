@@ -24,6 +24,9 @@ _ITERATIONS = 12
 _CONVERGED_PX = 0.003
 _LARGEST_STEP_PX = 3.0
 _LARGEST_SHEAR = 0.4
+_LARGEST_LEAP_PX = 8.0
+_LEAST_GAIN = 0.2
+_LEAST_VARIANCE = 1e-3  # grey levels squared
 _SHEAR_FROM_PX = 8.0
 _FLOOR_PX = 0.01  # interpolation, and what no residual shows
 _BLOCK_PX = 7
@@ -36,14 +39,12 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted warp: disparity at the point [px], its deviation [px], residual [grey levels], gain and affine part."""
+    """A fitted warp: disparity at the point [px], its deviation [px], what is left over [grey levels], linear part."""
 
     horizontal_px: float
     vertical_px: float
     sigma_px: float
     residual: float
-    correlation: float
-    window_px: float
     affine: Matrix
 
 
@@ -89,6 +90,69 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
         The fit, None where it does not converge or texture does not determine it.
 
     """
+    window = _linearised(left, point_px, sigma)
+    if window is None:
+        return None
+    found = np.vstack([warp, [0.0, 0.0, 1.0]])
+    gain = 1.0
+    for _ in range(_ITERATIONS):
+        seen = window.seen(right, point_px, found, gain)
+        solution = window.inverse @ np.einsum("in,n->i", window.weighted, seen)
+        gain = float(solution[6])
+        if not _LEAST_GAIN <= gain <= 1.0 / _LEAST_GAIN:
+            return None
+        step = solution[:6] / gain
+        found = found @ np.linalg.inv(_increment(step, sigma))
+        if np.abs(found[:2, :2] - np.eye(2)).max() > _LARGEST_SHEAR or np.abs(step[[0, 3]]).max() > _LARGEST_LEAP_PX:
+            return None
+        if np.abs(step).max() < _CONVERGED_PX:
+            break
+    residual = seen - np.einsum("i,in->n", solution, window.design)
+    variance = float((window.weights * residual**2).sum())
+    sigma_px = math.hypot(window.deviation(residual) / gain, _FLOOR_PX)
+    return Fit(-float(found[0, 2]), -float(found[1, 2]), sigma_px, math.sqrt(variance), found[:2, :2].copy())
+
+
+@dataclass(frozen=True)
+class _Window:
+    """The left image about the point as a linear model: `design` (8, N) are the six affine increments, gain, offset.
+
+    `offsets` are u (1, n) and v (n, 1) from the point [px], `gradients` across and down (n, n), `weights` (N) sum to 1,
+    `weighted` is their product with the design and `inverse` (8, 8) that of the normal matrix.
+    """
+
+    offsets: tuple[NDArray[np.floating], NDArray[np.floating]]
+    gradients: tuple[NDArray[np.floating], NDArray[np.floating]]
+    weights: Matrix
+    design: Matrix
+    weighted: Matrix
+    inverse: Matrix
+
+    def seen(self, right: Strip, point_px: tuple[float, float], warp: Matrix, gain: float) -> Matrix:
+        """Return what the right image shows at the warped offsets (N)."""
+        (u, v), (gx, gy) = self.offsets, self.gradients
+        x = warp[0, 0] * u + warp[0, 1] * v + (warp[0, 2] + point_px[0] - right.x0)
+        y = warp[1, 0] * u + warp[1, 1] * v + (warp[1, 2] + point_px[1] - right.y0)
+        # remap of OpenCV 4 rounds to this grid, that of OpenCV 5 does not: round first, make good what that misses.
+        near_x, near_y = np.rint(x * _REMAP_STEPS) / _REMAP_STEPS, np.rint(y * _REMAP_STEPS) / _REMAP_STEPS
+        maps = near_x.astype(np.float32), near_y.astype(np.float32)
+        sampled = cv2.remap(right.grey, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray((sampled + gain * ((x - near_x) * gx + (y - near_y) * gy)).ravel())
+
+    def deviation(self, residual: Matrix) -> float:
+        """Return the standard deviation of the horizontal translation [px, times gain] that the residuals (N) speak of.
+
+        What is left over is alike in neighbouring pixels (blur, edges, unmodelled depth): its effect is summed in
+        blocks before it is squared, as in estimates consistent under autocorrelation (Newey and West, 1987).
+        """
+        effect = self.weights * np.einsum("i,in->n", self.inverse[0], self.design) * residual
+        effect = effect.reshape(self.gradients[0].shape)
+        blocks = cv2.boxFilter(effect, -1, (_BLOCK_PX, _BLOCK_PX), normalize=False, borderType=cv2.BORDER_CONSTANT)
+        return math.sqrt(float((blocks**2).sum())) / _BLOCK_PX
+
+
+def _linearised(left: Strip, point_px: tuple[float, float], sigma: float) -> _Window | None:
+    """Return the window about the point as a linear model, None where it holds too little texture."""
     radius = radius_of(sigma)
     x, y = round(point_px[0] - left.x0), round(point_px[1] - left.y0)
     rows, columns = slice(y - radius, y + radius + 1), slice(x - radius, x + radius + 1)
@@ -100,69 +164,40 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
     weights = (np.exp(-0.5 * (v / sigma) ** 2) * np.exp(-0.5 * (u / sigma) ** 2)).ravel()
     weights /= weights.sum()
     centred = patch - float((weights * patch.ravel()).sum())
-    # Offsets are scaled by the window, so that the columns of the design are of one size.
-    columns_of_design = [gx, gx * (u / sigma), gx * (v / sigma), gy, gy * (u / sigma), gy * (v / sigma), centred]
+    # Offsets are scaled by the window, so that the rows of the design are of one size.
+    parts = [gx, gx * (u / sigma), gx * (v / sigma), gy, gy * (u / sigma), gy * (v / sigma), centred]
     design = np.empty((8, patch.size))
-    for row, column in zip(design[:7], columns_of_design, strict=True):
-        row[:] = column.ravel()
+    for row, part in zip(design[:7], parts, strict=True):
+        row[:] = part.ravel()
     design[7] = 1.0
     weighted = design * weights
     # einsum, not matmul: BLAS threads wait for one another whenever other nodes hold the cores.
     normal = np.einsum("in,jn->ij", weighted, design)
-    signal = float(normal[6, 6])
-    if signal < 1e-3:
+    if float(normal[6, 6]) < _LEAST_VARIANCE:
         return None
+    try:
+        inverse = np.linalg.inv(normal + np.diag(_damping(sigma)))
+    except np.linalg.LinAlgError:
+        return None
+    return _Window((u, v), (gx, gy), weights, design, weighted, inverse)
+
+
+def _damping(sigma: float) -> Matrix:
+    """Return what holds the steps (8) back where the texture says little, as if by priors at a noise of 2 levels."""
     damping = np.zeros(8)
-    noise = 1.0 / (2 * math.pi * sigma**2)
+    noise = 4.0 / (2 * math.pi * sigma**2)
     # A small window barely sees roll and slant, and fitting them costs it its precision: there they stay as they are.
     damping[[1, 2, 4, 5]] = noise / (_PRIOR_SHEAR * sigma) ** 2 if sigma >= _SHEAR_FROM_PX else 1e9
     damping[3] = noise / _PRIOR_VERTICAL_PX**2
-    try:
-        inverse = np.linalg.inv(normal + np.diag(damping * 4.0))
-    except np.linalg.LinAlgError:
-        return None
-    origin = (point_px[0] - right.x0, point_px[1] - right.y0)
-    homogeneous = np.vstack([warp, [0.0, 0.0, 1.0]])
-    gain = 1.0
-    for _ in range(_ITERATIONS):
-        places = [(row[0] * u + row[1] * v + (row[2] + start)) for row, start in zip(homogeneous, origin, strict=False)]
-        # remap of OpenCV 4 rounds to this grid, that of OpenCV 5 does not: round first, make good what that misses.
-        rounded = [np.rint(place * _REMAP_STEPS) / _REMAP_STEPS for place in places]
-        maps = [place.astype(np.float32) for place in rounded]
-        sampled = cv2.remap(right.grey, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        missed = gain * ((places[0] - rounded[0]) * gx + (places[1] - rounded[1]) * gy)
-        seen = (sampled + missed).ravel()
-        solution = inverse @ np.einsum("in,n->i", weighted, seen)
-        gain = float(solution[6])
-        if gain < 0.2 or gain > 5.0:
-            return None
-        step = solution[:6] / gain
-        increment = np.array(
-            [
-                [1 + step[1] / sigma, step[2] / sigma, step[0]],
-                [step[4] / sigma, 1 + step[5] / sigma, step[3]],
-                [0.0, 0.0, 1.0],
-            ]
-        )
-        homogeneous = homogeneous @ np.linalg.inv(increment)
-        if np.abs(homogeneous[:2, :2] - np.eye(2)).max() > _LARGEST_SHEAR or np.abs(step[[0, 3]]).max() > 8.0:
-            return None
-        if np.abs(step).max() < _CONVERGED_PX:
-            break
-    residual = seen - np.einsum("i,in->n", solution, design)
-    variance = float((weights * residual**2).sum())
-    # What is left over is alike in neighbouring pixels (blur, edges, unmodelled depth): its effect is summed in blocks
-    # before it is squared, as in heteroscedasticity and autocorrelation consistent estimates (Newey and West, 1987).
-    effect = (weights * np.einsum("i,in->n", inverse[0], design) * residual).reshape(patch.shape)
-    blocks = cv2.boxFilter(effect, -1, (_BLOCK_PX, _BLOCK_PX), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    noise_px = math.sqrt(float((blocks**2).sum()) / _BLOCK_PX**2) / gain
-    total = gain**2 * signal + variance
-    return Fit(
-        -float(homogeneous[0, 2]),
-        -float(homogeneous[1, 2]),
-        math.hypot(noise_px, _FLOOR_PX),
-        math.sqrt(variance),
-        math.sqrt(max(1.0 - variance / total, 0.0)),
-        sigma,
-        homogeneous[:2, :2].copy(),
+    return damping
+
+
+def _increment(step: Matrix, sigma: float) -> Matrix:
+    """Return the warp (3, 3) of an increment (6): translation across, two shears, translation down, two shears."""
+    return np.array(
+        [
+            [1 + step[1] / sigma, step[2] / sigma, step[0]],
+            [step[4] / sigma, 1 + step[5] / sigma, step[3]],
+            [0.0, 0.0, 1.0],
+        ]
     )
