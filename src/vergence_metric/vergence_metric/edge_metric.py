@@ -18,6 +18,7 @@ from vergence_metric.edges import Edges, Grey, ImageShapeError, detect_edges, to
 from vergence_metric.nearest_edges import NearestEdges
 from vergence_metric.oriented_edges import oriented_field
 from vergence_metric.robust import robust_distances
+from vergence_metric.scratch import Scratch
 from vergence_metric.windows import Window, centre_windows
 
 Figures = NDArray[np.float64]
@@ -70,11 +71,12 @@ class EdgeMetricResult:
 
 
 class EdgeMetric:
-    """Measures pair after pair; keeps only what alignment filters over time."""
+    """Measures pair after pair, on one thread; keeps only what alignment filters over time, and its memory."""
 
     def __init__(self, parameters: EdgeMetricParameters) -> None:
         self.parameters = parameters
         self._aligner = Aligner(parameters)
+        self._scratch = Scratch()
 
     def measure(self, left: NDArray[Any], right: NDArray[Any]) -> EdgeMetricResult:
         """Measure a pair of (h, w, 3) BGR or (h, w) grey uint8 images of one size.
@@ -103,7 +105,7 @@ class EdgeMetric:
             left_edges, right_edges = detect_edges(left_grey, p), detect_edges(right_grey, p)
         windows = centre_windows(p.windows_px, *left_grey.shape)
         with _timed(stage_s, "distance"):
-            nearest = NearestEdges(left_edges.mask, right_edges.mask, windows)
+            nearest = NearestEdges(left_edges.mask, right_edges.mask, windows, self._scratch)
             distances = edge_distances(nearest)
         with _timed(stage_s, "chance"):
             chance = chance_levels(nearest)
@@ -115,6 +117,7 @@ class EdgeMetric:
                 bins=p.orientation_bins,
                 signed=p.orientation_signed,
                 truncation_px=max(p.contrast_truncation_px, p.robust_truncation_px),
+                scratch=self._scratch,
             )
             contrast = contrasts(oriented, p.contrast_truncation_px)
             foveal = foveal_contrast(oriented, p.contrast_truncation_px, p.verged_sigma_px)

@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.scratch import Scratch
 from vergence_metric.windows import Window
 
 LEFT_TO_RIGHT, RIGHT_TO_LEFT = 0, 1
 """Directions: from left pixels to the nearest right edge, and back."""
 
 _LARGEST_SHORT_SIDE = 8192
-_BLOCK = 8192  # gathers made at once when few points are left: fits the second-level cache
+_BLOCK = 8192  # points looked at at once, and gathers made at once when few are left: fits the second-level cache
 _COLUMNS = 3  # columns tried on each side between two checks of what is finished
 
 
@@ -31,9 +32,17 @@ class NearestEdges:
     """Squared distances to the nearest edge pixel of the other image, inside each window and in both directions.
 
     `left_mask`, `right_mask` (h, w) uint8 are nonzero at edge pixels; `windows` are centre windows of that image.
+    With `scratch` the memory is taken from there: this object is then good until the next one made with it.
     """
 
-    def __init__(self, left_mask: NDArray[np.uint8], right_mask: NDArray[np.uint8], windows: Sequence[Window]) -> None:
+    def __init__(
+        self,
+        left_mask: NDArray[np.uint8],
+        right_mask: NDArray[np.uint8],
+        windows: Sequence[Window],
+        scratch: Scratch | None = None,
+    ) -> None:
+        self._scratch = scratch or Scratch()
         self.windows = tuple(windows)
         hull = _hull(self.windows)
         # row 0 is the image that distances are measured from in LEFT_TO_RIGHT, row 1 in RIGHT_TO_LEFT
@@ -74,9 +83,9 @@ class NearestEdges:
 
     def _squared_vertical(self) -> NDArray[Any]:
         """Return g^2 of every pixel of every window, both directions, one after the other."""
-        above, below, far = _scan(self._edges[::-1])
+        above, below, far = _scan(self._edges[::-1], self._scratch)
         kind: type[np.signedinteger[Any]] = np.int32 if above.dtype == np.int16 else np.int64
-        squares = np.empty(self._starts[-1], kind)
+        squares = self._scratch.array("vertical", (int(self._starts[-1]),), kind)
         n = len(self.windows)
         for i, (rows, columns) in enumerate(self._inside):
             row = np.arange(rows.start, rows.stop, dtype=above.dtype)[:, None]
@@ -101,7 +110,7 @@ def _hull(windows: Sequence[Window]) -> Window:
     )
 
 
-def _scan(edges: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any], int]:
+def _scan(edges: NDArray[np.bool_], scratch: Scratch) -> tuple[NDArray[Any], NDArray[Any], int]:
     """Return the row of the last edge at or above and of the first at or below each pixel, and a far distance.
 
     `edges` (2, h, w). Rows without such an edge hold -far and 2 * far.
@@ -109,9 +118,11 @@ def _scan(edges: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any], int]:
     height = edges.shape[1]
     kind, far = (np.int16, 16000) if max(edges.shape) <= _LARGEST_SHORT_SIDE else (np.int32, 2**28)
     row = np.arange(height, dtype=kind)[:, None]
-    above = np.where(edges, row, kind(-far))
-    below = np.where(edges, row, kind(2 * far))
-    spare = np.empty_like(above)
+    above, below, spare = (scratch.array(name, edges.shape, kind) for name in ("above", "below", "spare"))
+    above.fill(-far)
+    below.fill(2 * far)
+    np.copyto(above, row, where=edges)
+    np.copyto(below, row, where=edges)
     step = 1
     while step < height:  # after each round a pixel knows the edges within twice as many rows
         np.maximum(above[:, step:], above[:, :-step], out=spare[:, step:])
@@ -139,10 +150,13 @@ def _search(
     while len(active) and step <= widest:
         columns = min(max(_COLUMNS, _BLOCK // len(active)), widest - step + 1)
         offsets = np.arange(step, step + columns)[:, None]
-        found = vertical[np.minimum(index + offsets, row_end)]
-        np.minimum(found, vertical[np.maximum(index - offsets, row_start)], out=found)
-        found += (offsets * offsets).astype(vertical.dtype)
-        np.minimum(best, found.min(axis=0), out=best)
+        squares = (offsets * offsets).astype(vertical.dtype)
+        for start in range(0, len(active), _BLOCK):
+            some = slice(start, start + _BLOCK)
+            found = vertical[np.minimum(index[some] + offsets, row_end[some])]
+            np.minimum(found, vertical[np.maximum(index[some] - offsets, row_start[some])], out=found)
+            found += squares
+            np.minimum(best[some], found.min(axis=0), out=best[some])
         step += columns
         nearest[active] = best
         unfinished = np.flatnonzero(best > step * step)

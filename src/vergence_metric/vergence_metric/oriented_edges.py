@@ -9,9 +9,9 @@ ones: plane i of `OrientedEdges.planes` has a bin's bit set where an edge pixel 
 Each plane is the one before with a few shifted copies of the edges laid over it, for all bins at once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,10 @@ from numpy.typing import NDArray
 
 from vergence_metric.edge_parameters import LARGEST_TRUNCATION_PX, MOST_BINS
 from vergence_metric.edges import Edges
+from vergence_metric.scratch import Scratch
 from vergence_metric.windows import Window
+
+Buffer = Callable[[tuple[int, ...], type[np.uint8]], NDArray[np.uint8]]
 
 
 @dataclass(frozen=True)
@@ -93,13 +96,21 @@ _SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorde
 
 
 def oriented_field(
-    left: Edges, right: Edges, windows: Sequence[Window], *, bins: int, signed: bool, truncation_px: int
+    left: Edges,
+    right: Edges,
+    windows: Sequence[Window],
+    *,
+    bins: int,
+    signed: bool,
+    truncation_px: int,
+    scratch: Scratch | None = None,
 ) -> OrientedField:
     """Return the oriented edges of a pair, with distances up to `truncation_px`.
 
     `bins` directions over 360 degrees where `signed` tells dark-to-bright from bright-to-dark, else over 180; the first
     is centred on horizontal gradients. Neighbours may lie outside a window: unlike the paper's metric this one only
     looks `truncation_px` far, and edges cut off by a window's border would be nothing but noise.
+    With `scratch` the memory is taken from there: the field is then good until the next one made with it.
     """
     if not 1 <= truncation_px <= LARGEST_TRUNCATION_PX or not 1 <= bins <= MOST_BINS:
         raise ValueError(
@@ -107,7 +118,11 @@ def oriented_field(
             f"from 1 to {MOST_BINS}"
         )
     ordered = tuple(sorted(windows, key=lambda window: window.size_px))
-    images = [_oriented(edges, ordered, bins, signed, truncation_px) for edges in (left, right)]
+    scratch = scratch or Scratch()
+    images = [
+        _oriented(edges, ordered, bins, signed, truncation_px, partial(scratch.array, name))
+        for edges, name in ((left, "left planes"), (right, "right planes"))
+    ]
     return OrientedField(ordered, bins, truncation_px, (images[0], images[1]))
 
 
@@ -131,7 +146,9 @@ def _gaussian(length: int, sigma: float) -> NDArray[np.float64]:
     return np.exp(-0.5 * ((np.arange(length) - (length - 1) / 2.0) / sigma) ** 2)
 
 
-def _oriented(edges: Edges, windows: tuple[Window, ...], bins: int, signed: bool, truncation: int) -> OrientedEdges:
+def _oriented(
+    edges: Edges, windows: tuple[Window, ...], bins: int, signed: bool, truncation: int, buffer: Buffer
+) -> OrientedEdges:
     inner = windows[-1]
     rows, columns = (
         slice(inner.top - truncation, inner.bottom + truncation),
@@ -155,7 +172,7 @@ def _oriented(edges: Edges, windows: tuple[Window, ...], bins: int, signed: bool
     )
     inside = np.flatnonzero(ring < len(windows))
     return OrientedEdges(
-        row[inside], column[inside], bin_[inside], ring[inside], at[inside], _planes(base, stride, truncation)
+        row[inside], column[inside], bin_[inside], ring[inside], at[inside], _planes(base, stride, truncation, buffer)
     )
 
 
@@ -175,9 +192,9 @@ def _rings(spans: list[tuple[int, int]], length: int, margin: int) -> NDArray[np
     return ring
 
 
-def _planes(base: NDArray[np.uint8], stride: int, truncation: int) -> NDArray[np.uint8]:
+def _planes(base: NDArray[np.uint8], stride: int, truncation: int, buffer: Buffer) -> NDArray[np.uint8]:
     """Return the planes of all radii below the cut-off; rows are laid end to end, the outer margin is not valid."""
-    planes = np.empty((len(_offsets(truncation)), base.size), np.uint8)
+    planes = buffer((len(_offsets(truncation)), base.size), np.uint8)
     margin = (truncation - 1) * stride + truncation
     inner = slice(margin, base.size - margin)
     aside = [base]  # base shifted by dx to both sides
