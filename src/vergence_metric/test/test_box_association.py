@@ -235,8 +235,7 @@ def test_a_guess_does_not_become_the_past():
     memory.choose(found, 0.0, SIZE, None)
     expected = memory.expected(0.1, None)
     assert expected is not None
-    assert expected.left_px == (300, 200)
-    assert expected.right_px is None
+    assert (expected.left_px, expected.right_px) == ((300, 200), None)
 
 
 def test_gaze_geometry_of_a_fixated_point_has_no_disparity():

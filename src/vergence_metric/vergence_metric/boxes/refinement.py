@@ -21,12 +21,13 @@ Array = NDArray[np.float64]
 
 _COARSE_PX = 24  # width to which a box is shrunk for the first match
 _CORE = 0.7  # of the box's sides: its corners may show what is behind
-_GRID = 4
+_GRID = 6
 _LEAST_WINDOW_PX, _LARGEST_WINDOW_PX = 3.0, 9.0
-_WINDOW_SHARE = 0.1  # of the box's smaller side
-_LOCAL_PX = 4
+_WINDOW_SHARE = 0.07  # of the box's smaller side
+_LOCAL_PX, _LOCAL_SHARE = 3, 0.1  # of the box's width: how much nearer or farther a place may be than the whole
 _BLUR_PX = 0.9
-_SOUND_CORRELATION = 0.6
+_SOUND_CORRELATION = 0.7
+_LARGEST_SIGMA_PX = 0.8
 _LEAST_SIDE_PX = 8.0
 _VERTICAL_PX = 3.0
 
@@ -129,19 +130,21 @@ def _measure_grid(
     """Return disparity, vertical disparity and deviation (K, 3) [px] at the places of a grid that could be fitted."""
     sigma = float(np.clip(_WINDOW_SHARE * min(left_box.size_px), _LEAST_WINDOW_PX, _LARGEST_WINDOW_PX))
     margin = radius_of(sigma) + 3
-    reach = margin + round(0.15 * left_box.size_px[0]) + _LOCAL_PX
+    most = _LOCAL_PX + round(_LOCAL_SHARE * left_box.size_px[0])
+    reach = margin + 2 * most
     left_strip = _strip(left, left_box, margin)
     right_strip = _strip(right, right_box, reach)
-    x_min, y_min, x_max, y_max = _shrunk_box(left_box, 1.0 - 1.2 / _GRID + 0.1)
+    # The middles of equal parts of the box, so that their mean is the mean over it.
+    x_min, y_min, x_max, y_max = _shrunk_box(left_box, 1.0 - 1.0 / _GRID)
     found = []
     for y in np.linspace(y_min, y_max, _GRID):
         for x in np.linspace(x_min, x_max, _GRID):
-            local = _local(left_strip, right_strip, (float(x), float(y)), sigma, start)
+            local = _local(left_strip, right_strip, (float(x), float(y)), sigma, start, most)
             if local is None:
                 continue
             warp = np.array([[1.0, 0.0, -local[0]], [0.0, 1.0, -local[1]]])
             fit = fit_affine(left_strip, right_strip, (float(x), float(y)), sigma, warp)
-            if fit is None or fit.correlation < _SOUND_CORRELATION or abs(fit.horizontal_px - local[0]) > 2.0:
+            if fit is None or fit.sigma_px > _LARGEST_SIGMA_PX or abs(fit.horizontal_px - local[0]) > 2.0:
                 continue
             found.append((fit.horizontal_px, fit.vertical_px, fit.sigma_px))
     return np.array(found, np.float64).reshape(-1, 3)
@@ -155,13 +158,17 @@ def _strip(image: NDArray[Any], box: Box, margin: int) -> Strip:
 
 
 def _local(
-    left: Strip, right: Strip, point_px: tuple[float, float], sigma: float, start: tuple[float, float]
+    left: Strip,
+    right: Strip,
+    point_px: tuple[float, float],
+    sigma: float,
+    start: tuple[float, float],
+    reach: int,
 ) -> tuple[float, float] | None:
     """Return the whole-pixel disparity about the coarse one at which the window about a point fits best."""
     half = round(1.5 * sigma)
     x, y = round(point_px[0] - left.x0), round(point_px[1] - left.y0)
     patch = left.grey[y - half : y + half + 1, x - half : x + half + 1]
-    reach = _LOCAL_PX + round(0.5 * sigma)
     u = round(point_px[0] - start[0] - right.x0)
     v = round(point_px[1] - start[1] - right.y0)
     rows = slice(v - half - 2, v + half + 3)

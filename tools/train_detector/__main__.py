@@ -1,0 +1,61 @@
+"""Data, training, evaluation and export by one command; a second run takes up where the first one ended."""
+
+import argparse
+import time
+from pathlib import Path
+
+import cv2
+import torch
+
+from tools.train_detector.dataset import load, make
+from tools.train_detector.evaluation import evaluate
+from tools.train_detector.export import export
+from tools.train_detector.network import Detector
+from tools.train_detector.training import Schedule, train
+from vergence_metric.boxes.session import SHIPPED_MODEL
+
+TRAINING_SEEDS = 20_000
+HELD_OUT_SEEDS = 900_000
+
+
+def main() -> int:
+    """Run what the command line asks for."""
+    parser = argparse.ArgumentParser(prog="python -m tools.train_detector", description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("out/train_detector"), help="renders, state, figures")
+    parser.add_argument("--worlds", type=int, default=60, help="rooms to render for training")
+    parser.add_argument("--views", type=int, default=60, help="renders of each")
+    parser.add_argument("--held-out", type=int, default=8, help="rooms to evaluate on")
+    parser.add_argument("--minutes", type=float, default=45.0, help="of training, wall time")
+    parser.add_argument("--threads", type=int, default=1, help="of training")
+    parser.add_argument("--model", type=Path, help="where the model goes; default: OUT/rubik_cube.onnx")
+    parser.add_argument("--ship", action="store_true", help="put the model where the package has it")
+    options = parser.parse_args()
+
+    def say(text: str) -> None:
+        print(f"{time.strftime('%H:%M:%S')} {text}", flush=True)
+
+    cv2.setNumThreads(1)
+    torch.set_num_threads(options.threads)
+    torch.manual_seed(1)
+    folder = options.out
+    training = range(TRAINING_SEEDS, TRAINING_SEEDS + options.worlds)
+    held_out = range(HELD_OUT_SEEDS, HELD_OUT_SEEDS + options.held_out)
+    make(folder / "data", training, options.views, say)
+    make(folder / "held_out", held_out, options.views, say)
+    detector = Detector(classes=1)
+    renders = load(sorted((folder / "data").glob("world_*.npz")))
+    say(f"training on {len(renders.images)} renders for {options.minutes:g} min")
+    averaged = train(detector, lambda: renders, Schedule(options.minutes), folder, say)
+    path = SHIPPED_MODEL if options.ship else options.model or folder / "rubik_cube.onnx"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    about = {"description": "Rubik's cube, trained on the simulator's renders", "license": "Apache-2.0"}
+    apart = export(averaged, path, ("cube",), about)
+    say(f"{path}: {path.stat().st_size / 1e6:.1f} MB, boxes at most {apart:.1g} px off the trained network's")
+    scores = evaluate(path, load(sorted((folder / "held_out").glob("world_*.npz"))))
+    (folder / "scores.json").write_text(scores.as_json() + "\n", encoding="utf-8")
+    say(scores.as_json())
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

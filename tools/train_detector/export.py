@@ -1,0 +1,58 @@
+"""The trained network as an ONNX file that describes itself."""
+
+import json
+from copy import deepcopy
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import torch
+
+from tools.train_detector.dataset import INPUT_PX
+from tools.train_detector.network import STRIDES, Deployed, Detector, fuse
+
+
+class ExportError(RuntimeError):
+    """The exported model does not answer as the trained one does."""
+
+
+def export(detector: Detector, path: Path, names: tuple[str, ...], about: dict[str, str]) -> float:
+    """Write the model and return how far its boxes are from the trained network's at most [px].
+
+    The file's metadata say what it is: `names`, `stride`, `task`, and `about`. Its input size is dynamic, sides are
+    multiples of 16.
+    """
+    plain = Deployed(fuse(deepcopy(detector).eval())).eval()
+    example = torch.rand(1, 3, INPUT_PX[1], INPUT_PX[0])
+    with torch.no_grad():
+        expected = Deployed(detector.eval())(example).numpy()
+        torch.onnx.export(
+            plain,
+            (example,),
+            str(path),
+            dynamo=False,
+            opset_version=17,
+            input_names=["images"],
+            output_names=["outputs"],
+            dynamic_axes={"images": {0: "batch", 2: "height", 3: "width"}, "outputs": {0: "batch", 1: "boxes"}},
+        )
+    model = onnx.load(str(path))
+    facts = {
+        "task": "detect",
+        "layout": "yolov6",
+        "stride": str(max(STRIDES)),
+        "imgsz": json.dumps([INPUT_PX[1], INPUT_PX[0]]),
+        "names": json.dumps(dict(enumerate(names))),
+    }
+    for key, value in (facts | about).items():
+        entry = model.metadata_props.add()
+        entry.key, entry.value = key, value
+    onnx.checker.check_model(model)
+    onnx.save(model, str(path))
+    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    answer = session.run(None, {"images": example.numpy()})[0]
+    apart = float(np.abs(answer - expected).max())
+    if apart > 0.05:
+        raise ExportError(f"{path}: the exported model is {apart:.3g} off the trained one: allowed is 0.05")
+    return apart
