@@ -107,11 +107,10 @@ def test_the_mean_disparity_is_that_of_the_rendered_pixels(seeing):
     disparities = []
     for eye, other in (("left", "right"), ("right", "left")):
         rows, columns = np.nonzero(pixels_of(seeing, eye, "cube"))
-        for u, v in zip(columns[::7].tolist(), rows[::7].tolist(), strict=True):
-            point = teller._surface(eye, "cube", float(u), float(v))
-            if point is not None and teller._sees(other, point):
-                places = {name: teller.project(name, point)[0] for name in ("left", "right")}
-                disparities.append(places["left"] - places["right"])
+        points = teller.surface(eye, "cube", np.column_stack([columns, rows])[::7].astype(float))
+        for point in points[teller.sees(other, points)]:
+            places = {name: teller.project(name, point)[0] for name in ("left", "right")}
+            disparities.append(places["left"] - places["right"])
     assert seeing.truth().mean_disparity_px == pytest.approx(float(np.mean(disparities)), abs=0.5)
     seeing.set_parameters(seeing.parameters.replaced(target_yaw_rad=0.0))
 

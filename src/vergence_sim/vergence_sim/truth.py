@@ -72,6 +72,7 @@ class TruthTeller:
         }
         self._geoms = {name: geoms for name, geoms in self._geoms.items() if geoms}
         self._hit = np.zeros(1, np.int32)
+        self._cameras = {eye: model.camera(eye).id for eye in lenses}
 
     @property
     def objects(self) -> tuple[str, ...]:
@@ -115,15 +116,12 @@ class TruthTeller:
 
     def project(self, eye: str, point: Array) -> tuple[float, float]:
         """Return where a world point is in an eye's image, before its lens distorts it [px]; NaN behind it."""
-        x, y, depth = self._in_camera(eye, point)
-        if depth <= 1e-6:
-            return math.nan, math.nan
-        camera = self._lenses[eye].camera
-        return camera.cx_px + camera.fx_px * x / depth, camera.cy_px + camera.fy_px * y / depth
+        ((x, y),) = self._project(eye, np.asarray(point)[None]).tolist()
+        return x, y
 
     def box(self, eye: str, target: str) -> TrueBox | None:
         """Return the true box of an object in an eye's image, cut to it; None where none of it is inside."""
-        places = np.array([self.project(eye, point) for point in self._outline(target)])
+        places = self._project(eye, np.array(self._outline(target)))
         if np.isnan(places).any():
             return None
         places = self._lenses[eye].distorted_points(places)
@@ -143,11 +141,18 @@ class TruthTeller:
             bool(high[1] > height - 1),
         )
 
-    def _in_camera(self, eye: str, point: Array) -> tuple[float, float, float]:
-        camera = self._data.camera(eye)
+    def _project(self, eye: str, points: Array) -> Array:
+        """Return where world points (N, 3) are in an eye's undistorted image (N, 2) [px]; NaN behind it."""
+        origin, rotation = self._camera(eye)
+        spec = self._lenses[eye].camera
         # MuJoCo's cameras look along -z with y up.
-        x, y, z = np.array(camera.xmat).reshape(3, 3).T @ (point - np.array(camera.xpos))
-        return float(x), float(-y), float(-z)
+        local = (points - origin) @ rotation * (1.0, -1.0, -1.0)
+        depth = np.where(local[:, 2] > 1e-6, local[:, 2], math.nan)[:, None]
+        return np.asarray(local[:, :2] / depth * (spec.fx_px, spec.fy_px) + (spec.cx_px, spec.cy_px))
+
+    def _camera(self, eye: str) -> tuple[Array, Array]:
+        index = self._cameras[eye]
+        return self._data.cam_xpos[index].copy(), self._data.cam_xmat[index].reshape(3, 3).copy()
 
     def _eye_error(self, eye: str, point: Array) -> float:
         body = self._data.body(f"{eye}_camera")
@@ -193,51 +198,60 @@ class TruthTeller:
             points += [np.array(self._data.geom_xpos[geom]) + rotation @ corner for corner in corners]
         return points
 
-    def _samples(self, target: str) -> tuple[list[Array], dict[str, float]]:
-        """Sample the target's surface through both eyes' images: points, and who sees them."""
+    def _samples(self, target: str) -> tuple[Array, dict[str, float]]:
+        """Sample the target's surface through both eyes' images: points (N, 3) that both see, and each eye's share."""
         samples: list[Array] = []
         shares: dict[str, float] = {}
         for eye, other in (("left", "right"), ("right", "left")):
-            places = np.array([self.project(eye, point) for point in self._outline(target)])
-            seen = total = 0
-            if not np.isnan(places).any():
-                low, high = places.min(axis=0), places.max(axis=0)
-                for u in np.linspace(low[0], high[0], 2 * _GRID + 1)[1::2]:
-                    for v in np.linspace(low[1], high[1], 2 * _GRID + 1)[1::2]:
-                        point = self._surface(eye, target, u, v)
-                        if point is None:
-                            continue
-                        total += 1
-                        if not self._sees(eye, point):
-                            continue
-                        seen += 1
-                        if self._sees(other, point):
-                            samples.append(point)
-            shares[eye] = seen / total if total else 0.0
-        return samples, shares
+            points = self.surface(eye, target, self._grid(eye, target))
+            seen = self.sees(eye, points)
+            shares[eye] = float(seen.mean()) if len(points) else 0.0
+            samples.append(points[seen][self.sees(other, points[seen])])
+        return np.concatenate(samples), shares
 
-    def _surface(self, eye: str, target: str, u: float, v: float) -> Array | None:
-        camera, spec = self._data.camera(eye), self._lenses[eye].camera
-        ray = np.array([(u - spec.cx_px) / spec.fx_px, -(v - spec.cy_px) / spec.fy_px, -1.0])
-        direction = np.array(camera.xmat).reshape(3, 3) @ ray
-        origin = np.array(camera.xpos)
-        distance = self._cast(origin, direction, self._geoms[target])
-        return origin + direction * distance if math.isfinite(distance) else None
+    def _grid(self, eye: str, target: str) -> Array:
+        places = self._project(eye, np.array(self._outline(target)))
+        if np.isnan(places).any():
+            return np.empty((0, 2))
+        low, high = places.min(axis=0), places.max(axis=0)
+        shares = (np.arange(_GRID) + 0.5) / _GRID
+        u, v = np.meshgrid(low[0] + shares * (high[0] - low[0]), low[1] + shares * (high[1] - low[1]))
+        return np.column_stack([u.ravel(), v.ravel()])
 
-    def _sees(self, eye: str, point: Array) -> bool:
-        u, v = self.project(eye, point)
+    def surface(self, eye: str, target: str, pixels: Array) -> Array:
+        """Return where the rays of undistorted pixels (N, 2) of an eye meet an object, hidden or not: (M, 3)."""
+        origin, rotation = self._camera(eye)
         spec = self._lenses[eye].camera
-        if not (0 <= u <= spec.width_px - 1 and 0 <= v <= spec.height_px - 1):
-            return False
-        origin = np.array(self._data.camera(eye).xpos)
-        direction = point - origin
-        length = float(np.linalg.norm(direction))
-        nearest = mujoco.mj_ray(self._model, self._data, origin, direction / length, _SEEN_GROUPS, True, -1, self._hit)
-        return nearest < 0 or nearest > length - _SAME_SURFACE_M
+        rays = np.column_stack(
+            [
+                (pixels[:, 0] - spec.cx_px) / spec.fx_px,
+                -(pixels[:, 1] - spec.cy_px) / spec.fy_px,
+                np.full(len(pixels), -1.0),
+            ]
+        )
+        directions = rays @ rotation.T
+        distances = np.array([self._cast(origin, direction, self._geoms[target]) for direction in directions])
+        met = np.isfinite(distances)
+        return np.asarray(origin + directions[met] * distances[met, None])
 
-    def _mean_disparity(self, samples: list[Array]) -> float:
-        values = [self.project("left", point)[0] - self.project("right", point)[0] for point in samples]
-        return float(np.mean(values)) if values else math.nan
+    def sees(self, eye: str, points: Array) -> npt.NDArray[np.bool_]:
+        """Return which world points (N, 3) lie in an eye's image with nothing before them (N,)."""
+        spec = self._lenses[eye].camera
+        with np.errstate(invalid="ignore"):
+            u, v = self._project(eye, points).T
+            inside = (u >= 0) & (u <= spec.width_px - 1) & (v >= 0) & (v <= spec.height_px - 1)
+        origin, _ = self._camera(eye)
+        lengths = np.linalg.norm(points - origin, axis=1)
+        for index in np.flatnonzero(inside):
+            direction = (points[index] - origin) / lengths[index]
+            nearest = mujoco.mj_ray(self._model, self._data, origin, direction, _SEEN_GROUPS, True, -1, self._hit)
+            inside[index] = nearest < 0 or nearest > lengths[index] - _SAME_SURFACE_M
+        return inside
+
+    def _mean_disparity(self, samples: Array) -> float:
+        if not len(samples):
+            return math.nan
+        return float((self._project("left", samples)[:, 0] - self._project("right", samples)[:, 0]).mean())
 
     def _cast(self, origin: Array, direction: Array, geoms: list[int]) -> float:
         """Return how far along `direction` the nearest of `geoms` lies, in its lengths; inf if it meets none."""
