@@ -197,21 +197,21 @@ def rest_rows(say: Say) -> list[Row]:
 
 
 def distance_rows(say: Say) -> list[Row]:
-    """Distance at rest, and its stated 95 % interval."""
+    """Distance at rest, its stated 95 % interval, and what the visual encoder gains."""
     rows: list[Row] = []
-    for servo in ("ideal", "sg90", "mg995"):
-        setting = Setting(servo=servo)
-        inside, widths = [], []
+    for servo, encoder, count in (("ideal", False, 50), ("sg90", False, 50), ("sg90", True, 20), ("mg995", False, 50)):
+        suffix = f"{servo}.with_encoder" if encoder else servo
+        inside, widths, errors = [], [], {}
         for distance in (0.3, 0.5, 1.0, 1.5):
-            trials = run_all(scenarios.at_distance(50, distance), setting)
-            errors = [abs(trace.distance_m[-1, 0] - distance) / distance for _, trace in trials]
-            inside += [trace.distance_m[-1, 1] <= distance <= trace.distance_m[-1, 2] for _, trace in trials]
-            widths += [(trace.distance_m[-1, 2] - trace.distance_m[-1, 1]) / distance for _, trace in trials]
-            rows.append(
-                Row(f"gaze.distance_error.{servo}.at_{distance:g}_m", float(np.median(errors)), "of the distance")
-            )
-        rows.append(Row(f"gaze.distance_interval.{servo}", float(np.mean(inside)), "share inside"))
-        rows.append(Row(f"gaze.distance_interval_width.{servo}", float(np.median(widths)), "of the distance"))
+            trials = run_all(scenarios.at_distance(count, distance, encoder), Setting(servo=servo))
+            said = np.array([trace.distance_m[-1] for _, trace in trials]) / distance
+            errors[distance] = float(np.median(np.abs(said[:, 0] - 1.0)))
+            inside += ((said[:, 1] <= 1.0) & (said[:, 2] >= 1.0)).tolist()
+            widths += (said[:, 2] - said[:, 1]).tolist()
+            rows.append(Row(f"gaze.distance_error.{suffix}.at_{distance:g}_m", errors[distance], "of the distance"))
+        rows.append(Row(f"gaze.distance_error.{suffix}", float(np.mean(list(errors.values()))), "of the distance"))
+        rows.append(Row(f"gaze.distance_interval.{suffix}", float(np.mean(inside)), "share inside"))
+        rows.append(Row(f"gaze.distance_interval_width.{suffix}", float(np.median(widths)), "of the distance"))
     say("distances done")
     return rows
 

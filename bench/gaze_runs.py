@@ -10,14 +10,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from vergence_rig.geometry import rotation_rig_from_eye
 from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 from vergence_servo.gaze.controller import GazeController
 from vergence_servo.gaze.fake_head import TICK_S, FakeHead, Seeing
 from vergence_servo.gaze.goals import Goal, GoalKind
-from vergence_servo.gaze.observations import BoxSighting, Observation
+from vergence_servo.gaze.observations import BoxSighting, EyeRotation, Observation
 from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.phases import Phase
+from vergence_servo.gaze.visual_encoder import relative_rotation
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
 
@@ -25,7 +27,7 @@ Array = npt.NDArray[np.float64]
 
 SERVOS: Mapping[str, ServoSpec] = {"ideal": IDEAL, "sg90": SG90, "mg995": MG995}
 CONTROL_TICKS = 3
-DECLARED_TOLERANCE_DEG = 1.0
+ENCODER_TICKS = 60
 
 
 def tolerance_deg(servo: str) -> float:
@@ -44,6 +46,7 @@ class Scenario:
     seed: int = 0
     visible: Callable[[float], bool] = lambda time_s: True
     clutter: Callable[[float], Array] | None = None
+    encoder: bool = False
 
 
 @dataclass(frozen=True)
@@ -217,6 +220,8 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
         if math.isinf(first_result_s) and any(_shows_target(observation) for observation in arrived):
             first_result_s = now_s
             travel_s = _travel_s(head)
+        if scenario.encoder and ticks % ENCODER_TICKS == 0:
+            arrived += background_rotation(head)
         began = time.perf_counter()
         command = controller.step(now_s, arrived)
         took_s = time.perf_counter() - began
@@ -250,6 +255,26 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
         first_result_s=first_result_s,
         travel_s=travel_s,
     )
+
+
+def background_rotation(head: FakeHead, matches: int = 250, wrong_share: float = 0.15) -> list[Observation]:
+    """Return what the visual encoder says of features of a room as the head sees them now, with wrong matches."""
+    random = np.random.default_rng(int(head.time_s * 3000.0))
+    version, tilt = 0.5 * float(head.true_rad[0] + head.true_rad[1]), float(head.true_rad[2])
+    pairs: list[Array] = []
+    while len(pairs) < matches:
+        aside, up = random.uniform(-0.45, 0.45), random.uniform(-0.38, 0.38)
+        ray = rotation_rig_from_eye(version, tilt) @ (1.0, aside, up)
+        point = ray * random.uniform(0.6, 4.0)
+        views = np.concatenate([head.project(point, left=True), head.project(point, left=False)])
+        views += random.normal(0.0, head.seeing.noise_px / head.rig.left_camera.fx_px, 4)
+        if random.random() < wrong_share:
+            views[2:] = random.uniform(-0.4, 0.4, 2)
+        pairs.append(views)
+    seen = np.array(pairs)
+    said = np.array([head.reported_rad[name] for name in JOINT_NAMES])
+    found = relative_rotation(seen[:, :2], seen[:, 2:], float(said[0]), float(said[1]))
+    return [EyeRotation(head.time_s - 0.004, 0.0, found.vergence_rad, found.sigma_rad)]
 
 
 def _begin(controller: GazeController, scenario: Scenario, head: FakeHead) -> None:

@@ -188,13 +188,14 @@ def rig_turns(count: int, given: str = "pairs", seed: int = 8) -> list[Scenario]
     return scenarios
 
 
-def at_distance(count: int, distance_m: float, given: str = "pairs", seed: int = 9) -> list[Scenario]:
-    """Targets at rest at one distance."""
+def at_distance(count: int, distance_m: float, encoder: bool = False, seed: int = 9) -> list[Scenario]:
+    """Targets at rest at one distance, with or without the visual encoder."""
     scenarios = []
     for i in range(count):
         random = np.random.default_rng([seed, i])
         point = place(distance_m, math.radians(random.uniform(-30, 30)), math.radians(random.uniform(-15, 15)))
-        scenarios.append(Scenario(still(point), in_view_start(point, random), 2.5, given, seed=1000 * seed + i))
+        start = in_view_start(point, random)
+        scenarios.append(Scenario(still(point), start, 2.5, "pairs", seed=1000 * seed + i, encoder=encoder))
     return scenarios
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from vergence_rig.rig import Rig
 from vergence_servo.gaze.directions import spread_of_eye
-from vergence_servo.gaze.distance import UNKNOWN, joint_variances, target_position
+from vergence_servo.gaze.distance import UNKNOWN, TargetPosition, VergenceOffset, joint_variances, target_position
 from vergence_servo.gaze.frames import point_in_rig
 from vergence_servo.gaze.goal_start import WantedClass, WantedPose, start_of
 from vergence_servo.gaze.goal_watch import GoalWatch, Progress
@@ -21,6 +21,7 @@ from vergence_servo.gaze.limits import CommandLimits
 from vergence_servo.gaze.observations import (
     BoxSighting,
     EdgeJudgement,
+    EyeRotation,
     FoveaDisparity,
     JointReport,
     Observation,
@@ -31,6 +32,7 @@ from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.phases import Phase, PhaseMachine, Situation
 from vergence_servo.gaze.report import Command, GazeReport, disparity_px, fixation_of_joints, residual_of
 from vergence_servo.gaze.search_pattern import Searcher
+from vergence_servo.gaze.target_filter import TargetEstimate
 from vergence_servo.gaze.tracking import SightingError, TargetTracking
 
 Array = npt.NDArray[np.float64]
@@ -56,6 +58,7 @@ class GazeController:
         self._history = JointHistory(rig)
         self._limits = CommandLimits(rig)
         self._shaft_variances = joint_variances(rig)
+        self._offset = VergenceOffset(self._shaft_variances)
         self._goals = GoalWatch()
         self._enabled = True
         self._pose: Array | None = None
@@ -179,10 +182,16 @@ class GazeController:
 
     def _observe(self, observation: Observation, now_s: float) -> None:
         if isinstance(observation, JointReport):
-            if self._history.add(observation.stamp_s, observation.positions_rad):
-                self._tracking.note_motion()
+            if self._history.add(observation.stamp_s, observation.positions_rad) and self._tracking.note_motion():
+                self._offset.moved(observation.stamp_s)
             return
         if not self._history.known or not observation.stamp_s <= now_s + _CLOCK_JUMP_S:
+            return
+        if isinstance(observation, EyeRotation):
+            if self._tracking.eyes_were_still(observation.stamp_s, observation.skew_s):
+                left, right, _ = self._history.shaft_at(observation.stamp_s)
+                said_rad = float(right - left)
+                self._offset.see(observation.stamp_s, observation.vergence_rad - said_rad, observation.sigma_rad)
             return
         if isinstance(observation, EdgeJudgement):
             self._image_s = now_s
@@ -390,7 +399,12 @@ class GazeController:
             residual_rad=residual,
             residual_px=disparity_px(residual[1], self._rig.left_camera.fx_px),
             contrast=self._judge.contrast,
-            target=target_position(estimate, self._rig, self._shaft_variances) if estimate is not None else UNKNOWN,
+            target=self._position(estimate),
             fixation_m=fixation,
             miss_distance_m=miss,
+        )
+
+    def _position(self, estimate: TargetEstimate | None) -> TargetPosition:
+        return (
+            UNKNOWN if estimate is None else target_position(estimate, self._rig, self._shaft_variances, self._offset)
         )

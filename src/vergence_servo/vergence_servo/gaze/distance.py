@@ -6,7 +6,7 @@ doubt: half a degree is 13 cm at one metre.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,8 @@ _TO_95_PERCENT = 1.9  # servo errors are bounded: their tails are lighter than a
 _PLAY_DOUBT = 0.22 / math.sqrt(3.0)
 """Dead band and play of a servo are each within a fifth or so of its data sheet; which side it rests on is known."""
 _SHARED_NOISE = 1.6
+_ENCODER_GATE = 16.0
+_ENCODER_FLOOR_RAD = 3.5e-4  # no lens model is exact, however many frames are averaged
 """Estimators that read the same pair share its noise, which the filter takes for independent."""
 
 
@@ -49,9 +51,47 @@ def joint_variances(rig: Rig) -> Array:
     )
 
 
-def target_position(estimate: TargetEstimate, rig: Rig, shaft_variances: Array) -> TargetPosition:
-    """Return the target's position from the filter's estimate and the shafts' variances (3,) [rad^2]."""
+class VergenceOffset:
+    """How far the true vergence is from the shafts' estimated one, learnt from the visual encoder while the eyes rest.
+
+    Every move of a pan makes it unknown again: the shaft then stops elsewhere in its play.
+    """
+
+    def __init__(self, shaft_variances: Array) -> None:
+        self._prior = float(shaft_variances[0] + shaft_variances[1])
+        self.moved(-math.inf)
+
+    def moved(self, stamp_s: float) -> None:
+        """A pan has moved, at `stamp_s`."""
+        self.offset_rad, self.variance = 0.0, self._prior
+        self._rest_since_s = stamp_s
+
+    def see(self, stamp_s: float, difference_rad: float, sigma_rad: float) -> bool:
+        """Take a measured true vergence minus the shafts' at that stamp; False if it is not of this rest or no use."""
+        if not (math.isfinite(difference_rad) and 0.0 < sigma_rad < 0.1 and stamp_s > self._rest_since_s):
+            return False
+        spread = self.variance + sigma_rad**2
+        if (difference_rad - self.offset_rad) ** 2 > _ENCODER_GATE * spread:
+            return False
+        gain = self.variance / spread
+        self.offset_rad += gain * (difference_rad - self.offset_rad)
+        self.variance = max((1.0 - gain) * self.variance, min(_ENCODER_FLOOR_RAD**2, self._prior))
+        return True
+
+
+def target_position(
+    estimate: TargetEstimate, rig: Rig, shaft_variances: Array, offset: VergenceOffset | None = None
+) -> TargetPosition:
+    """Return the target's position from the filter's estimate and the shafts' variances (3,) [rad^2].
+
+    With an `offset` the visual encoder's knowledge stands in for what is not known of the pans.
+    """
     left, right, tilt = shaft_variances
+    if offset is not None:
+        scale = offset.variance / max(left + right, 1e-12)
+        left, right = left * scale, right * scale
+        angles = estimate.angles_rad + np.array([0.0, offset.offset_rad, 0.0])
+        estimate = replace(estimate, angles_rad=angles)
     covariance = _SHARED_NOISE * estimate.covariance
     covariance[0, 0] += 0.25 * (left + right)
     covariance[1, 1] += left + right

@@ -83,7 +83,7 @@ class FakeHead:
             half = 0.5 * (servo.dead_band_rad + servo.backlash_rad)
             self._plants[name] = ServoPlant(servo, start + self._random.uniform(-half, half), self.begin_s)
             self._models[name] = ServoPlant(joint.servo, start, self.begin_s)
-        self._reported_rad = {name: self.start_rad.get(name, 0.0) for name in JOINT_NAMES}
+        self.reported_rad = {name: self.start_rad.get(name, 0.0) for name in JOINT_NAMES}
         self._track_id, self._lock_s = 1, self.begin_s + 0.1
         self._pending_frame: tuple[float, Array, bool] | None = None
         self._left_pixel = np.full(2, math.nan)
@@ -129,8 +129,8 @@ class FakeHead:
         self._note_saccades()
         if self._ticks % 3 == 0:
             for name in JOINT_NAMES:
-                self._reported_rad[name] = self._models[name].modelled_rad
-            self._send(now_s + 0.002, JointReport(now_s, dict(self._reported_rad)))
+                self.reported_rad[name] = self._models[name].modelled_rad
+            self._send(now_s + 0.002, JointReport(now_s, dict(self.reported_rad)))
         phase = self._ticks % self.seeing.frame_ticks
         if phase == 0:
             self._pending_frame = (now_s, self._project(left=True), self.visible(now_s))

@@ -91,4 +91,16 @@ class EdgeJudgement:
     verged: bool
 
 
-Observation: TypeAlias = JointReport | FoveaDisparity | TrackSighting | BoxSighting | PointSighting | EdgeJudgement
+@dataclass(frozen=True)
+class EyeRotation:
+    """The cameras' true vergence [rad] in a pair, from background features, with its standard deviation."""
+
+    stamp_s: float
+    skew_s: float
+    vergence_rad: float
+    sigma_rad: float
+
+
+Observation: TypeAlias = (
+    JointReport | FoveaDisparity | TrackSighting | BoxSighting | PointSighting | EdgeJudgement | EyeRotation
+)

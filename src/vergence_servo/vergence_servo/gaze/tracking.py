@@ -101,15 +101,18 @@ class TargetTracking:
         """Return the target at `time_s`, or None if there is none."""
         return self.filter.at(time_s) if self.filter.initialised else None
 
-    def note_motion(self) -> None:
-        """Take how the joints have moved in the newest report as doubt about their angles, from its stamp on."""
+    def note_motion(self) -> bool:
+        """Take how the joints have moved in the newest report as doubt about their angles, from its stamp on.
+
+        Returns whether a pan has moved.
+        """
         reported = self._history.reported_rad
         if self._last_reported is None:
             self._last_reported = reported
-            return
+            return True
         move = reported - self._last_reported
         if not np.any(move):
-            return
+            return False
         self._last_reported = reported
         half_play = self._history.half_play_rad
         direction = np.sign(move)
@@ -120,6 +123,7 @@ class TargetTracking:
         variances = _MOVE_VARIANCE_RAD * half_play * np.abs(move) + turned * (share * half_play) ** 2
         if np.any(variances):
             self._moves.append((self._history.newest_s, variances))
+        return bool(np.any(move[:2]))
 
     def _loosen_before(self, stamp_s: float) -> None:
         """Tell the filter of the moves before an exposure: an image from before a move knows nothing of its doubt."""
