@@ -9,7 +9,8 @@ from vergence_metric.scratch import Scratch
 def test_a_name_keeps_its_memory_and_grows_when_it_must() -> None:
     scratch = Scratch()
     first = scratch.array("a", (4, 5), np.int32)
-    assert (first.shape, first.dtype) == ((4, 5), np.int32)
+    assert first.shape == (4, 5)
+    assert first.dtype == np.int32
     assert np.shares_memory(first, scratch.array("a", (10,), np.uint8))
     assert not np.shares_memory(first, scratch.array("b", (4, 5), np.int32))
     assert scratch.array("a", (100, 100), np.float64).shape == (100, 100)
