@@ -333,7 +333,7 @@ def test_the_whole_head_is_calibrated_by_what_it_sees():
     head = WallHead(old, signs={"pan_right": -1, "tilt": -1}, zeros={"pan_left": 1.5 * DEG, "pan_right": -1.5 * DEG})
     told: list[str] = []
     cameras = {"left": CAMERA, "right": CAMERA}
-    fresh = calibrate_head(head, old, cameras, 1e-6, VisualParameters(loops=1, far_m=1e3), told.append)
+    fresh = calibrate_head(head, old, cameras, 1e-6, VisualParameters(far_m=1e3), told.append)
     assert [fresh[name].sign for name in fresh] == [1, -1, -1]
     for name in fresh:
         assert abs(fresh[name].joint_rad(1600) - fresh[name].joint_rad(1500)) == pytest.approx(10 * DEG, rel=0.05)

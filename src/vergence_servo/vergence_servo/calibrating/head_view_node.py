@@ -21,7 +21,8 @@ from vergence_servo.calibration import CalibrationError
 
 _EYES = ("left", "right")
 _SETTLE_S = 0.5
-_PATIENCE_S = 10.0
+_PATIENCE_S = 15.0
+_FIRST_PATIENCE_S = 45.0
 
 
 class HeadView:
@@ -57,7 +58,7 @@ class HeadView:
 
     def camera_models(self) -> dict[str, CameraModel]:
         """Return the models of the cameras that publish a calibration."""
-        self._wait_for_images(0)
+        self._wait_for_images(0, _FIRST_PATIENCE_S)
         models = {}
         for eye, info in self._cameras.items():
             try:
@@ -88,14 +89,14 @@ class HeadView:
                 raise CalibrationError("nobody takes joint_command: start servo_node (or sim_node) first")
             time.sleep(0.05)
 
-    def _wait_for_images(self, after_ns: int) -> dict[str, Pixels]:
+    def _wait_for_images(self, after_ns: int, patience_s: float = _PATIENCE_S) -> dict[str, Pixels]:
         def fresh() -> bool:
             stamps = [to_nanoseconds(self._images[eye].header.stamp) for eye in _EYES if eye in self._images]
             return len(stamps) == len(_EYES) and min(stamps) > after_ns
 
         with self._arrival:
-            if not self._arrival.wait_for(fresh, _PATIENCE_S):
-                raise CalibrationError(f"no fresh left/image_raw and right/image_raw for {_PATIENCE_S:g} s")
+            if not self._arrival.wait_for(fresh, patience_s):
+                raise CalibrationError(f"no fresh left/image_raw and right/image_raw for {patience_s:g} s")
             return {eye: image_to_array(image) for eye, image in self._images.items()}
 
     def _into(self, store: dict[str, Any], eye: str) -> Callable[[Any], None]:

@@ -22,7 +22,7 @@ class VisualParameters(Parameters):
 
     amplitude_deg: float = parameter(5.0, "moves go this far either way", unit="degrees", minimum=1, maximum=15)
     steps: int = parameter(10, "in so many steps", minimum=4, maximum=40)
-    loops: int = parameter(2, "up and down so often", minimum=1, maximum=10)
+    loops: int = parameter(1, "up and down so often", minimum=1, maximum=10)
     far_m: float = parameter(
         0.0, "distance of what the eyes see, for the pans' trims; 0: leave them", unit="m", minimum=0
     )
