@@ -1,5 +1,6 @@
 """Every layout is found and read; what cannot be used says so in one line."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -205,3 +206,9 @@ def test_images_that_are_none(image, onnx_model):
 
 def test_grey_images_are_taken(onnx_model):
     assert len(load(onnx_model("yolov6")).detect(np.full((96, 128), 255, np.uint8))) > 0
+
+
+def test_without_onnxruntime_it_says_so(onnx_model, monkeypatch):
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    with pytest.raises(DetectorError, match="onnxruntime is not installed"):
+        load(onnx_model("yolov6"))

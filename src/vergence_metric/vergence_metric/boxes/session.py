@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
 from vergence_metric.boxes.errors import DetectorError, ModelFileError, ModelLayoutError
@@ -59,6 +58,10 @@ class ModelSession:
         self.path = Path(path).expanduser() if str(path) else SHIPPED_MODEL
         if not self.path.is_file():
             raise ModelFileError(f"model {self.path}: no such file")
+        try:
+            import onnxruntime
+        except ImportError as error:
+            raise DetectorError("onnxruntime is not installed: pip install onnxruntime") from error
         provider = _PROVIDERS[device]
         available = onnxruntime.get_available_providers()
         if provider not in available:
