@@ -118,7 +118,8 @@ class SceneBuilder(ModelBuilder):
             )
             for eye, sign in (("left", 1), ("right", -1))
         )
-        post = self._hidden("cylinder", (-0.03, 0, -HEAD_HEIGHT_M / 2 - 0.04), (0.02, HEAD_HEIGHT_M / 2 - 0.04), steel)
+        height = HEAD_HEIGHT_M - 0.054
+        post = self._hidden("cylinder", (0, 0, -0.054 - height / 2), (0.015, height / 2), steel)
         self.add(
             f'<body name="rig_base" pos="0 0 {HEAD_HEIGHT_M}"><joint name="yaw" type="hinge" axis="0 0 1"/>'
             f'<inertial pos="0 0 0" mass="1" diaginertia="1e-2 1e-2 1e-2"/>{post}'
