@@ -14,10 +14,13 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from sensor_msgs.srv import SetCameraInfo
+from std_msgs.msg import Header
 
 from vergence_camera.camera_info import Calibration, load_calibration, save_calibration
+from vergence_camera.camera_messages import JpegSerializer
 from vergence_camera.camera_node import CameraNode
 from vergence_camera.errors import ControlError, FileMissingError, ModeMismatchError
 from vergence_camera.fake_machine import FakeMachine
@@ -25,7 +28,7 @@ from vergence_camera.v4l2 import structures as v4l2
 from vergence_camera.v4l2.fake_kernel import FakeCamera
 from vergence_common.images import image_to_array
 from vergence_common.qos import IMAGE_QOS
-from vergence_common.stamps import to_nanoseconds
+from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_rig.parameters import ParameterError
 
 pytestmark = pytest.mark.graph
@@ -415,3 +418,16 @@ def test_parameters_of_the_loop_change_at_run_time(
     assert not result.successful
     assert "max_age_s" in result.reason
     assert not node.set_parameters([Parameter("device", value="1")])[0].successful
+
+
+@pytest.mark.parametrize("frame_id", ["", "a", "abc", "abcd", "left_camera_optical_frame", "äöü"])
+@pytest.mark.parametrize("size", [0, 1, 1001])
+def test_the_serialised_message_is_what_the_middleware_makes(frame_id: str, size: int) -> None:
+    data = bytes(range(256)) * 4
+    stamp_ns = 1_795_369_597_195_928_723
+    message = CompressedImage(header=Header(stamp=from_nanoseconds(stamp_ns), frame_id=frame_id), format="jpeg")
+    message.data = data[:size]
+    serialised = JpegSerializer(frame_id)(data[:size], stamp_ns)
+    assert deserialize_message(serialised, CompressedImage) == message
+    # In between and at the end the middleware pads with whatever lay in its memory.
+    assert len(serialize_message(message)) - len(serialised) in range(4)

@@ -79,3 +79,15 @@ def test_a_missing_end_can_be_let_pass(make_jpeg: Make) -> None:
     with pytest.raises(CorruptFrameError):
         inspect_jpeg(cut)
     assert inspect_jpeg(cut, must_be_whole=False).width_px == 640
+
+
+def test_the_memory_of_the_last_header_changes_nothing(make_jpeg: Make) -> None:
+    """A stream's headers are alike, but the next frame may be of another size, or damaged in its header."""
+    small, large = make_jpeg(0, 64, 48), make_jpeg(0, 320, 240)
+    for data, width in ((small, 64), (make_jpeg(1, 64, 48), 64), (large, 320), (small, 64)):
+        assert inspect_jpeg(data).width_px == width
+    for cut in (5, 100, small.index(b"\xff\xda") + 3):
+        with pytest.raises(CorruptFrameError):
+            inspect_jpeg(small[:cut])
+    with pytest.raises(CorruptFrameError):
+        inspect_jpeg(b"\xff\xd8" + bytes(20) + small[22:])

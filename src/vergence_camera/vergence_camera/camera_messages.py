@@ -1,20 +1,35 @@
 """Frames, calibrations and controls to ROS messages and back."""
 
-import array
+import struct
 
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
-from sensor_msgs.msg import CameraInfo, CompressedImage
+from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 from vergence_camera.camera_info import Calibration
 from vergence_camera.v4l2.controls import ControlSpec
 
 
-def jpeg_message(jpeg: bytes, header: Header) -> CompressedImage:
-    """Return a message with the JPEG's bytes as they are."""
-    message = CompressedImage(header=header, format="jpeg")
-    message.data = array.array("B", jpeg)
-    return message
+class JpegSerializer:
+    """JPEG bytes to a serialised sensor_msgs/CompressedImage (CDR, little endian; OMG DDSI-RTPS 10).
+
+    Every part but the stamp and the data is the same for each frame. Handing the middleware these bytes spares a third
+    of what it costs to publish a frame from Python.
+    """
+
+    def __init__(self, frame_id: str) -> None:
+        self._names = _cdr_text(frame_id) + _cdr_text("jpeg")
+
+    def __call__(self, jpeg: bytes, stamp_ns: int) -> bytes:
+        """Return the message with the JPEG's bytes as they are, for `publisher.publish`."""
+        seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+        head = struct.pack("<4siI", b"\0\1\0\0", seconds, nanoseconds)
+        return b"".join((head, self._names, struct.pack("<I", len(jpeg)), jpeg))
+
+
+def _cdr_text(text: str) -> bytes:
+    data = text.encode() + b"\0"
+    return struct.pack("<I", len(data)) + data + b"\0" * (-len(data) % 4)
 
 
 def camera_info_message(calibration: Calibration | None, width_px: int, height_px: int, header: Header) -> CameraInfo:

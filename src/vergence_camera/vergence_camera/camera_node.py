@@ -10,7 +10,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from vergence_camera.calibration_of_node import NodeCalibration
-from vergence_camera.camera_messages import jpeg_message
+from vergence_camera.camera_messages import JpegSerializer
 from vergence_camera.capture_loop import CaptureLoop
 from vergence_camera.control_port import ControlPort
 from vergence_camera.controls_of_node import PREFIX, NodeControls
@@ -46,6 +46,7 @@ class CameraNode(Node):
         settings: CameraParameters = self._settings.value
         eye = self.get_namespace().rpartition("/")[2]
         self._frame_id = settings.frame_id or f"{eye}_camera_optical_frame".lstrip("_")
+        self._serialise = JpegSerializer(self._frame_id)
         self._controls.configure(settings.lock, settings.lock_after_s)
         self._rig_size = self._size_in_rig(settings.rig, eye)
 
@@ -95,15 +96,15 @@ class CameraNode(Node):
     def _deliver(self, frame: Frame, stamp: Stamp) -> None:
         """Publish one frame, in the capture thread; each form only if someone listens to it."""
         began_ns = time.monotonic_ns()
-        header = Header(stamp=from_nanoseconds(stamp.ros_ns), frame_id=self._frame_id)
         try:
             if self._compressed.get_subscription_count():
-                self._compressed.publish(jpeg_message(self._jpeg(frame), header))
+                self._compressed.publish(self._serialise(self._jpeg(frame), stamp.ros_ns))
             if self._info.get_subscription_count():
+                header = self._header(stamp)
                 self._info.publish(self._calibration.message(frame.width_px, frame.height_px, header))
             if self._raw.get_subscription_count():
                 pixels, encoding = decode(frame)
-                self._raw.publish(array_to_image(pixels, header, encoding))
+                self._raw.publish(array_to_image(pixels, self._header(stamp), encoding))
         except CorruptFrameError as error:
             self._health.corrupt(error)
             return
@@ -114,6 +115,9 @@ class CameraNode(Node):
         if self._partner is not None:
             self._partner.skew.own(stamp.ros_ns)
         self._health.published((stamp.age_ns + time.monotonic_ns() - began_ns) * 1e-9)
+
+    def _header(self, stamp: Stamp) -> Header:
+        return Header(stamp=from_nanoseconds(stamp.ros_ns), frame_id=self._frame_id)
 
     def _jpeg(self, frame: Frame) -> bytes:
         if frame.encoding is Encoding.JPEG and isinstance(frame.data, bytes):

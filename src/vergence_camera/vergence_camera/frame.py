@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -31,8 +31,7 @@ class Encoding(Enum):
     YUYV = "yuyv"
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(NamedTuple):
     """One frame, untouched.
 
     `data` is the camera's own bytes for JPEG and YUYV, and uint8 pixels (h, w, 3) or (h, w) for BGR and GREY.

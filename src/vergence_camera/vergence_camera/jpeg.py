@@ -10,6 +10,7 @@ _FRAME_HEADERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _START_OF_SCAN = 0xDA
 # Inside entropy-coded data 0xFF is stuffed with 0x00; only restart markers may stand there.
 _MARKER_IN_SCAN = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
+_last_header: tuple[bytes, tuple[int, int, int]] | None = None
 _BETWEEN_SCANS = frozenset({0xC4, 0xDA, 0xDB, 0xDC, 0xDD, 0xFE})
 
 
@@ -38,6 +39,25 @@ def inspect_jpeg(data: bytes, *, must_be_whole: bool = True) -> JpegInfo:
     """
     if data[:2] != _START:
         raise CorruptFrameError(f"frame of {len(data)} bytes does not begin like a JPEG (ff d8): {data[:4].hex(' ')}")
+    known = _last_header
+    if known is not None and data.startswith(known[0]):
+        position, size = len(known[0]), known[1]
+    else:
+        position, size = _read_header(data)
+    end = _end_of_scans(data, position)
+    if end is None:
+        if must_be_whole:
+            raise CorruptFrameError(f"JPEG of {len(data)} bytes has no end marker or a foreign one in its data")
+        end = len(data)
+    return JpegInfo(*size, end)
+
+
+def _read_header(data: bytes) -> tuple[int, tuple[int, int, int]]:
+    """Return where the coded data begins, and width, height and components; remember them for the next frame.
+
+    A camera's header is the same in every frame, so that it is parsed once.
+    """
+    global _last_header
     position, size = 2, None
     while True:
         code, payload, position = _segment(data, position)
@@ -49,12 +69,8 @@ def inspect_jpeg(data: bytes, *, must_be_whole: bool = True) -> JpegInfo:
             break
     if size is None or 0 in size:
         raise CorruptFrameError("JPEG has no size before its first scan")
-    end = _end_of_scans(data, position)
-    if end is None:
-        if must_be_whole:
-            raise CorruptFrameError(f"JPEG of {len(data)} bytes has no end marker or a foreign one in its data")
-        end = len(data)
-    return JpegInfo(size[0], size[1], size[2], end)
+    _last_header = (data[:position], size)
+    return position, size
 
 
 def _segment(data: bytes, position: int) -> tuple[int, bytes, int]:

@@ -1,15 +1,14 @@
 """From a capture time on some clock of this machine to ROS time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from vergence_camera.frame import Clock, Frame
 
 _STEADY_READING_NS = 100_000
 
 
-@dataclass(frozen=True)
-class Stamp:
+class Stamp(NamedTuple):
     """A frame's ROS time in nanoseconds, and how old the frame was when it was stamped."""
 
     ros_ns: int

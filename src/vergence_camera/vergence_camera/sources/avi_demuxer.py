@@ -3,6 +3,7 @@
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
 
@@ -34,7 +35,7 @@ def is_avi(path: Path) -> bool:
     return head[:4] == b"RIFF" and head[8:] == b"AVI "
 
 
-def read_header(file: BinaryIO, name: str) -> AviHeader:
+def read_header(file: BinaryIO | FileIO, name: str) -> AviHeader:
     """Return the description of the first video stream.
 
     Raises:
@@ -66,7 +67,7 @@ def read_header(file: BinaryIO, name: str) -> AviHeader:
     raise UnsupportedError(f"{name}: the AVI file has no video stream")
 
 
-def frames(file: BinaryIO, header: AviHeader, name: str) -> Iterator[bytes]:
+def frames(file: BinaryIO | FileIO, header: AviHeader, name: str) -> Iterator[bytes]:
     """Yield the video stream's chunks in order of the file; empty ones repeat the last frame and are left out.
 
     Raises:
@@ -91,7 +92,9 @@ def frames(file: BinaryIO, header: AviHeader, name: str) -> Iterator[bytes]:
         position = end + (end & 1)
 
 
-def _walk(file: BinaryIO, position: int, end: int, enter: tuple[bytes, ...]) -> Iterator[tuple[bytes, int, int]]:
+def _walk(
+    file: BinaryIO | FileIO, position: int, end: int, enter: tuple[bytes, ...]
+) -> Iterator[tuple[bytes, int, int]]:
     """Yield tag, begin and length of each chunk; lists whose type is in `enter` are yielded (by type) and entered."""
     while position + 8 <= end:
         tag, length = struct.unpack("<4sI", _read_at(file, position, 8))
@@ -106,10 +109,10 @@ def _walk(file: BinaryIO, position: int, end: int, enter: tuple[bytes, ...]) -> 
         position = begin + length + (length & 1)
 
 
-def _read_at(file: BinaryIO, position: int, length: int) -> bytes:
+def _read_at(file: BinaryIO | FileIO, position: int, length: int) -> bytes:
     file.seek(position)
     return file.read(length)
 
 
-def _size_of(file: BinaryIO) -> int:
+def _size_of(file: BinaryIO | FileIO) -> int:
     return file.seek(0, 2)

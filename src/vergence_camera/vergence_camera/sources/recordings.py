@@ -37,7 +37,7 @@ class AviRecording:
 
     def pictures(self) -> Iterator[Picture]:
         """See Recording."""
-        with self._path.open("rb") as file:
+        with self._path.open("rb", buffering=0) as file:  # the demuxer asks for what it needs and no more
             header = read_header(file, self.identity)
             for data in frames(file, header, self.identity):
                 yield Picture(data)
