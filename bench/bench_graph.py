@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import rclpy
@@ -31,7 +32,6 @@ from vergence_msgs.msg import EdgeVergence
 PERIOD_NS = round(1e9 / 30)
 SKEW_NS = 11_000_000
 DISPARITY_PX = 12
-_PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 
 
 @dataclass(frozen=True)
@@ -72,13 +72,24 @@ def measure(skew_ns: int, seconds: float, shipped_profile: bool) -> Outcome:
     with own_domain() as domain:
         environment = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         if not shipped_profile:
-            environment[_PROFILE] = ""
+            environment["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(_empty_profile())
         with ProcessGroup(OUT_DIR / "graph_logs", environment) as nodes:
             nodes.start("edge_metric_node", NodeCommand("vergence_metric", "edge_metric_node"))
-            with _receiver(domain) as receiver, _eyes(os.environ | environment, nodes) as eyes:
-                while not receiver.is_matched():
+            with _receiver(domain) as receiver, _eyes(os.environ | environment) as eyes:
+                patience_s = time.monotonic() + 60.0
+                while not (receiver.is_matched() and all(eye.is_ready() for eye in eyes)):
                     nodes.check()
+                    if time.monotonic() > patience_s:
+                        raise RuntimeError("the processes did not find one another within 60 s")
                 return _timed_run(eyes, receiver, skew_ns, seconds)
+
+
+def _empty_profile() -> Path:
+    """Return a profile that changes nothing: where none is set, ProcessGroup would set ours."""
+    path = OUT_DIR / "default_transport.xml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text('<profiles>\n  <participant profile_name="as_built"/>\n</profiles>\n')
+    return path
 
 
 class Eye:
@@ -95,14 +106,16 @@ class Eye:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._to, self._from = self._process.stdin, self._process.stdout
+        self._ready = False
 
     def is_ready(self) -> bool:
-        """Wait half a second at most for the eye to say that the node takes its images."""
-        if not select.select([self._from], [], [], 0.5)[0]:
-            return False
-        if self._from.readline().strip() != "ready":
-            raise RuntimeError(f"an eye ended with status {self._process.wait()}")
-        return True
+        """Tell whether the eye has said that the node takes its images; waits a little for it."""
+        if not self._ready and select.select([self._from], [], [], 0.1)[0]:
+            line = self._from.readline()
+            if not line:
+                raise RuntimeError(f"an eye ended with status {self._process.wait()}")
+            self._ready = line.strip() == "ready"
+        return self._ready
 
     def start(self, **timetable: int) -> None:
         """Let it publish; see `bench.eye_publisher`."""
@@ -121,13 +134,9 @@ class Eye:
 
 
 @contextmanager
-def _eyes(environment: dict[str, str], nodes: ProcessGroup) -> Iterator[list[Eye]]:
-    """Start both eyes and wait until the node takes their images."""
+def _eyes(environment: dict[str, str]) -> Iterator[list[Eye]]:
     eyes = [Eye("left/image_raw", 0, environment), Eye("right/image_raw", DISPARITY_PX, environment)]
     try:
-        for eye in eyes:
-            while not eye.is_ready():
-                nodes.check()
         yield eyes
     finally:
         for eye in eyes:
