@@ -19,7 +19,7 @@ from vergence_servo.command_guard import (
     ordered_positions,
 )
 from vergence_servo.commanders import Commander, conflict
-from vergence_servo.trajectory import Trajectory, TrajectoryPoint
+from vergence_servo.trajectory import Trajectory, TrajectoryPoint, check_end, start_delay_s
 
 JOINTS = ("pan_left", "pan_right", "tilt")
 S = 1_000_000_000
@@ -137,3 +137,14 @@ def test_two_commanders_are_named():
     assert "/teleop on joint_trajectory" in conflict({"joint_command": [one], "joint_trajectory": [other]})
     twins = [Commander("/gaze", b"1"), Commander("/gaze", b"2")]
     assert "2 commanders" in conflict({"joint_command": twins})
+
+
+def test_trajectories_begin_at_their_stamp_and_end_in_time():
+    assert start_delay_s(0, 100 * S, 0.5) == 0.0
+    assert start_delay_s(102 * S, 100 * S, 0.5) == pytest.approx(2.0)
+    assert start_delay_s(50 * S, 100 * S, 0.0) == pytest.approx(-50.0)
+    with pytest.raises(StaleCommandError, match=r"began 1\.000 s ago"):
+        start_delay_s(99 * S, 100 * S, 0.5)
+    check_end(60.0, 60.0)
+    with pytest.raises(MalformedCommandError, match=r"end in 1000000000\.0 s"):
+        check_end(1e9, 60.0)

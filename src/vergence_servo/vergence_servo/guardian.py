@@ -61,7 +61,11 @@ def main(args: Sequence[str] | None = None) -> int:
         heard = (heard + part)[-len(_FAREWELL) :]
     if heard == _FAREWELL:
         return 0
-    driver = open_driver(options.backend, options.values)
+    try:
+        driver = open_driver(options.backend, options.values)
+    except ValueError as error:
+        print(f"guardian: servo_node died, and its channels cannot be released: {error}", file=sys.stderr)
+        return 1
     status = 0
     for channel in options.channels:
         try:

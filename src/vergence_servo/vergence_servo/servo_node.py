@@ -38,7 +38,7 @@ from vergence_servo.servo_channel import ServoChannel
 from vergence_servo.servo_head import Mode, ServoHead
 from vergence_servo.servo_health import CommandCounts, Health, channel_health, commands_health, head_health
 from vergence_servo.servo_parameters import ServoNodeParameters
-from vergence_servo.trajectory import Trajectory
+from vergence_servo.trajectory import Trajectory, check_end, start_delay_s
 
 COMMAND_TOPICS = ("joint_command", "~/commands", "joint_trajectory")
 
@@ -142,8 +142,10 @@ class ServoNode(Node):
         def take(now_s: float) -> None:
             points = convert.trajectory_points(message)
             trajectory = Trajectory(message.joint_names, points, self._head.sent_rad())
-            stamp_ns = to_nanoseconds(message.header.stamp)
-            delay_s = (stamp_ns - self.get_clock().now().nanoseconds) * 1e-9 if stamp_ns else 0.0
+            stamp_ns, now_ns = to_nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
+            values: ServoNodeParameters = self._settings.value
+            delay_s = start_delay_s(stamp_ns, now_ns, values.command_max_age_s)
+            check_end(delay_s + trajectory.duration_s, values.trajectory_max_s)
             self._head.follow(trajectory, now_s + delay_s, now_s)
 
         self._take("joint_trajectory", take)

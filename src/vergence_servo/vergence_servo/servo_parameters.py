@@ -44,6 +44,9 @@ class ServoNodeParameters(HeadParameters):
     command_max_ahead_s: float = parameter(
         0.1, "stamps further ahead of this clock are refused", unit="s", minimum=0, maximum=3600
     )
+    trajectory_max_s: float = parameter(
+        60.0, "trajectories that would end later than this from now are refused", unit="s", minimum=0.1, maximum=3600
+    )
 
     def check(self) -> None:
         """Refuse backends by name, and the built-in servos with real ones."""

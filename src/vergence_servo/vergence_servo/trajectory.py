@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from vergence_servo.command_guard import MalformedCommandError, UnknownJointError
+from vergence_servo.command_guard import MalformedCommandError, StaleCommandError, UnknownJointError
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,23 @@ class Trajectory:
             return dict(zip(self.joints, self._points[0].positions_rad, strict=True))
         before, after = self._points[i], self._points[i + 1]
         return {name: _between(before, after, j, time_s) for j, name in enumerate(self.joints)}
+
+
+def start_delay_s(stamp_ns: int, now_ns: int, max_age_s: float) -> float:
+    """Return when a trajectory with this stamp begins, from now [s]; a stamp of 0 means now.
+
+    Raises StaleCommandError where it began more than `max_age_s` ago (0: any stamp will do).
+    """
+    delay_s = (stamp_ns - now_ns) * 1e-9 if stamp_ns else 0.0
+    if max_age_s > 0 and -delay_s > max_age_s:
+        raise StaleCommandError(f"the trajectory began {-delay_s:.3f} s ago: allowed is {max_age_s:g} s")
+    return delay_s
+
+
+def check_end(end_s: float, longest_s: float) -> None:
+    """Raise MalformedCommandError where a trajectory would end more than `longest_s` from now: no time-out sees it."""
+    if end_s > longest_s:
+        raise MalformedCommandError(f"the trajectory would end in {end_s:.1f} s: allowed is {longest_s:g} s")
 
 
 def _between(before: TrajectoryPoint, after: TrajectoryPoint, joint: int, time_s: float) -> float:

@@ -1,0 +1,41 @@
+"""`vergence watch` on a pseudo-terminal beside a running servo_node."""
+
+import os
+import pty
+import select
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.system
+
+
+def test_it_draws_the_joints_until_q_is_pressed(domain_id: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    node = subprocess.Popen([sys.executable, "-m", "vergence_servo.servo_node"], stderr=subprocess.DEVNULL)
+    master, slave = pty.openpty()
+    argv = [sys.executable, "-m", "vergence_bringup.command_line", "watch"]
+    watch = subprocess.Popen(argv, stdin=slave, stdout=slave, stderr=slave, start_new_session=True)
+    os.close(slave)
+    try:
+        shown, deadline_s = "", time.monotonic() + 30
+        while "pan_right " not in shown or "servo_node: servos: released" not in shown:
+            assert select.select([master], [], [], deadline_s - time.monotonic())[0], shown
+            shown += os.read(master, 65536).decode(errors="replace")
+        os.write(master, b"q")
+        while select.select([master], [], [], 0.5)[0]:
+            try:
+                shown += os.read(master, 65536).decode(errors="replace")
+            except OSError:
+                break
+        assert watch.wait(15) == 0
+        assert shown.startswith("\033[?1049h")
+        assert "\033[?1049l" in shown
+    finally:
+        for process in (watch, node):
+            process.terminate()
+            process.wait(15)
+        os.close(master)
