@@ -38,6 +38,9 @@ def run(say: Callable[[str], None]) -> list[Row]:
     rows: list[Row] = []
     for suffix, degradation in (("", HARD), (".clean", Degradation())):
         verged, unverged = _measured(UNSEEN_DRAWINGS, UNSEEN_PHOTOGRAPHS, degradation, seed=20, real=True)
+        say(
+            f"{suffix or '.hard'}: error {_balanced_error(_foveal(verged), _foveal(unverged), fitted):.2%} at the fitted"
+        )
         rows += _judged(say, suffix, verged, unverged)
     rows += _judged(say, ".rendered", *_rendered_pairs())
     return rows + _window_spread(say)
