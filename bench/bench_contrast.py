@@ -39,7 +39,8 @@ def run(say: Callable[[str], None]) -> list[Row]:
     for suffix, degradation in (("", HARD), (".clean", Degradation())):
         verged, unverged = _measured(UNSEEN_DRAWINGS, UNSEEN_PHOTOGRAPHS, degradation, seed=20, real=True)
         say(
-            f"{suffix or '.hard'}: error {_balanced_error(_foveal(verged), _foveal(unverged), fitted):.2%} at the fitted"
+            f"{suffix or '.hard'}: error {_balanced_error(_foveal(verged), _foveal(unverged), fitted):.2%} at the "
+            "fitted threshold"
         )
         rows += _judged(say, suffix, verged, unverged)
     rows += _judged(say, ".rendered", *_rendered_pairs())

@@ -1,9 +1,9 @@
 """Whether the eyes are verged: contrast of the fovea together with the signed error, with hysteresis.
 
 Contrast alone is fooled by texture that repeats, the signed error alone by a confident mismatch; large windows mix
-depths and read high at vergence. On the scenes set aside for fitting 0.52 separates best; the shipped threshold is more
-lenient, for targets smaller than the fovea, as the signed error has to agree. bench/bench_contrast.py scores it on other
-scenes.
+depths and read high at vergence. On the scenes set aside for fitting 0.52 separates best. The shipped threshold is more
+lenient, for targets smaller than the fovea, as the signed error has to agree; bench/bench_contrast.py scores both on
+other scenes.
 """
 
 import math
