@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 import numpy as np
+import yaml
 
 from vergence_bringup.demo_report import write_report
 from vergence_bringup.demo_result import StationResult, table, write_summary
@@ -19,8 +20,6 @@ from vergence_bringup.demo_stations import Station, stations
 from vergence_bringup.processes import NodeCommand, ProcessGroup, config_dir, environment
 from vergence_common.domains import own_domain
 from vergence_rig.rig import Rig, load_rig
-
-SERVOS = ("sg90", "mg995", "ideal")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -112,7 +111,7 @@ def _run_stations(
 
 
 def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
-    rig = str(config_dir() / "rig.yaml")
+    rig = str(_ideal_rig(options.out) if options.ideal else config_dir() / "rig.yaml")
     sim: dict[str, object] = {"rig": rig, "seed": options.seed}
     if options.ideal:
         sim["preset"] = "ideal"
@@ -121,6 +120,17 @@ def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
         "edge_metric_node": NodeCommand("vergence_metric", "edge_metric_node", {"rig": rig}),
         "gaze_controller_node": NodeCommand("vergence_servo", "gaze_controller_node", {"rig": rig}),
     }
+
+
+def _ideal_rig(out_dir: Path) -> Path:
+    """Write the shipped rig with ideal servos, so that the controller does not reckon with play that is not there."""
+    rig = yaml.safe_load((config_dir() / "rig.yaml").read_text(encoding="utf-8"))
+    for joint in rig["joints"].values():
+        joint["servo"] = "ideal"
+    path = out_dir / "rig_ideal.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(rig), encoding="utf-8")
+    return path.resolve()
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -84,7 +84,7 @@ def marker_80_80() -> Station:
 def stations(baseline_m: float, short: bool = False) -> list[Station]:
     """Return the demo's stations in order; the short demo has one of each kind."""
     free = [
-        Station("cube_near_left", "0.35 m, 12 degrees left", "cube", _at(0.35, 12.0, 0.0)),
+        Station("cube_near_left", "0.4 m, 10 degrees left", "cube", _at(0.4, 10.0, 0.0)),
         Station("cube_right_up", "0.7 m, 20 degrees right, 10 up", "cube", _at(0.7, -20.0, 10.0)),
         Station("cube_left_down", "1.2 m, 18 degrees left, 6 down", "cube", _at(1.2, 18.0, -6.0)),
         Station("cube_far_up", "1.7 m, 8 degrees right, 8 up", "cube", _at(1.7, -8.0, 8.0)),

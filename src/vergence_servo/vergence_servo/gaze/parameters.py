@@ -36,7 +36,7 @@ class GazeParameters(Parameters):
     )
     settle_s: float = parameter(0.02, "rest before an exposure, for it to be used", unit="s", minimum=0, maximum=0.5)
     hold_tolerance_rad: float = parameter(
-        0.0008, "error that a joint leaves alone, beside its share of the dead band", unit="rad", minimum=0, maximum=0.1
+        0.0004, "error that a joint leaves alone, beside its share of the dead band", unit="rad", minimum=0, maximum=0.1
     )
     dead_band_trust: float = parameter(
         0.85, "share of the known play that is crossed at once when a joint turns round", minimum=0, maximum=1
