@@ -20,7 +20,7 @@ _PROPORTIONAL = np.array([3.5, 3.5, 3.5])
 _INTEGRAL = np.array([2.5, 1.0, 2.5])
 _DERIVATIVE = np.array([0.1, 0.05, 0.1])
 _LARGEST_INTEGRAL_RAD = 0.25
-_INTEGRATED_RAD = math.radians(4.0)
+_INTEGRATED_RAD = math.radians(8.0)
 _STALE_S = 0.3
 
 
