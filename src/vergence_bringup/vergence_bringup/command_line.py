@@ -9,7 +9,6 @@ COMMANDS = {
     "demo": ("demo", "run the whole graph on the simulated head and write a report"),
     "measure": ("measure", "metric I (and II) of two stored images"),
     "calibrate": ("calibrate", "calibrate the cameras from chessboard or ChArUco views"),
-    "identify": ("identify", "measure latencies, gains and signs of a rig with a few small moves"),
     "watch": ("watch", "live terminal view of a running graph"),
     "doctor": ("doctor", "say what is missing on this machine and how to mend it"),
 }
