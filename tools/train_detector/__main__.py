@@ -7,9 +7,10 @@ from pathlib import Path
 import cv2
 import torch
 
+from tools.train_detector.card import write_figures
 from tools.train_detector.dataset import load, make
 from tools.train_detector.evaluation import evaluate
-from tools.train_detector.export import export
+from tools.train_detector.export import add_words, export
 from tools.train_detector.network import Detector
 from tools.train_detector.training import Schedule, train
 from vergence_metric.boxes.session import SHIPPED_MODEL
@@ -52,7 +53,10 @@ def main() -> int:
     apart = export(averaged, path, ("cube",), about)
     say(f"{path}: {path.stat().st_size / 1e6:.1f} MB, boxes at most {apart:.1g} px off the trained network's")
     scores = evaluate(path, load(sorted((folder / "held_out").glob("world_*.npz"))))
+    add_words(path, {"threshold": f"{scores.threshold:g}"})
     (folder / "scores.json").write_text(scores.as_json() + "\n", encoding="utf-8")
+    if options.ship:
+        write_figures(SHIPPED_MODEL.with_suffix(".md"), scores)
     say(scores.as_json())
     return 0
 

@@ -14,7 +14,8 @@ from vergence_metric.boxes import Detector
 SMALL_PX = (8.0, 16.0)
 _HARDLY_VISIBLE = 0.5
 _LEAST_PX = 6.0
-_THRESHOLDS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
+_THRESHOLDS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65)
+_FALSE_PER_1000 = 5.0
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,12 @@ class Scores:
     ap50_small: float
     false_per_1000: dict[str, float]
     recall: dict[str, float]
+
+    @property
+    def threshold(self) -> float:
+        """The lowest threshold with few enough false detections; the highest one tried where none has."""
+        good = [float(t) for t, false in self.false_per_1000.items() if false <= _FALSE_PER_1000]
+        return min(good, default=max(_THRESHOLDS))
 
     def as_json(self) -> str:
         """Return the figures as JSON."""

@@ -17,6 +17,14 @@ class ExportError(RuntimeError):
     """The exported model does not answer as the trained one does."""
 
 
+def add_words(path: Path, words: dict[str, str]) -> None:
+    """Put words into a model file's metadata, in place of those of the same name."""
+    model = onnx.load(str(path))
+    kept = {entry.key: entry.value for entry in model.metadata_props} | words
+    onnx.helper.set_model_props(model, kept)
+    onnx.save(model, str(path))
+
+
 def export(detector: Detector, path: Path, names: tuple[str, ...], about: dict[str, str]) -> float:
     """Write the model and return how far its boxes are from the trained network's at most [px].
 
@@ -37,7 +45,6 @@ def export(detector: Detector, path: Path, names: tuple[str, ...], about: dict[s
             output_names=["outputs"],
             dynamic_axes={"images": {0: "batch", 2: "height", 3: "width"}, "outputs": {0: "batch", 1: "boxes"}},
         )
-    model = onnx.load(str(path))
     facts = {
         "task": "detect",
         "layout": "yolov6",
@@ -45,11 +52,8 @@ def export(detector: Detector, path: Path, names: tuple[str, ...], about: dict[s
         "imgsz": json.dumps([INPUT_PX[1], INPUT_PX[0]]),
         "names": json.dumps(dict(enumerate(names))),
     }
-    for key, value in (facts | about).items():
-        entry = model.metadata_props.add()
-        entry.key, entry.value = key, value
-    onnx.checker.check_model(model)
-    onnx.save(model, str(path))
+    add_words(path, facts | about)
+    onnx.checker.check_model(onnx.load(str(path)))
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     answer = session.run(None, {"images": example.numpy()})[0]
     apart = float(np.abs(answer - expected).max())

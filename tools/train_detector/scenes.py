@@ -18,7 +18,7 @@ Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
 
 CUBES = 3
-LOOK_ALIKES = 5
+LOOK_ALIKES = 8
 WIDTH_PX, HEIGHT_PX = 640, 480
 _FOCAL_PX = 539.0
 _HIDDEN = np.array([0.0, 0.0, -5.0])
@@ -184,7 +184,7 @@ class Stage:
             shown = with_cubes and (number == 0 or rng.random() < 0.15)
             self._place(f"cube{number}", shown, _width_px(rng))
         for number in range(LOOK_ALIKES):
-            self._place(f"alike{number}", rng.random() < 0.3, _width_px(rng))
+            self._place(f"alike{number}", rng.random() < 0.35, _width_px(rng))
         self._place("marker", rng.random() < 0.15, rng.uniform(10, 60))
         if with_cubes and rng.random() < 0.12:
             self._hide_partly()

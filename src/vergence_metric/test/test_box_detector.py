@@ -212,3 +212,11 @@ def test_without_onnxruntime_it_says_so(onnx_model, monkeypatch):
     monkeypatch.setitem(sys.modules, "onnxruntime", None)
     with pytest.raises(DetectorError, match="onnxruntime is not installed"):
         load(onnx_model("yolov6"))
+
+
+def test_the_model_names_its_own_threshold(onnx_model):
+    strict = onnx_model("yolov6", metadata={"threshold": "0.95"})
+    assert load(strict, threshold=0.0).threshold == 0.95
+    assert len(load(strict, threshold=0.0).detect(picture())) == 1
+    assert len(load(strict, threshold=0.5).detect(picture())) == 2
+    assert load(onnx_model("yolov6", metadata={"threshold": "high"}), threshold=0.0).threshold == 0.35

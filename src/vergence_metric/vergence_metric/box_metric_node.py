@@ -132,6 +132,8 @@ class BoxMetricNode(Node):
                 self._overlay_publisher.publish(array_to_image(picture, header))
 
     def _on_failure(self, error: Exception) -> None:
+        if not self.context.ok():
+            return  # the node is ending: nothing can be published any more
         self._failure = f"{type(error).__name__}: {error}"
         text = "".join(traceback.format_exception(error))
         self.get_logger().error(f"a pair could not be measured:\n{text}", throttle_duration_sec=10.0)

@@ -19,8 +19,9 @@ class DetectorParameters(Parameters):
     )
     device: str = parameter("cpu", "where onnxruntime runs it", choices=DEVICES, read_only=True)
     threshold: float = parameter(
-        0.35,
-        "objects with a lower score are left out; exports with baked-in thresholds keep those too",
+        0.0,
+        "objects with a lower score are left out; 0 for what the model says, else 0.35; an export with suppression "
+        "inside has its own threshold besides",
         minimum=0.0,
         maximum=1.0,
     )

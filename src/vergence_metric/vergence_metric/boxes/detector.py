@@ -18,6 +18,7 @@ from vergence_metric.boxes.session import ModelSession
 from vergence_metric.boxes.suppression import suppress
 
 _DEFAULT_SIZE_PX = (640, 640)
+_DEFAULT_THRESHOLD = 0.35
 _GREY = 114
 
 
@@ -64,13 +65,18 @@ class Detector:
         """The model's file."""
         return self._session.path
 
+    @property
+    def threshold(self) -> float:
+        """The score that objects need."""
+        return self._parameters.threshold or self._session.own_threshold() or _DEFAULT_THRESHOLD
+
     def describe(self) -> str:
         """Return one line on what was loaded."""
         how = self.preprocessing
         width, height = self.input_px
         return (
             f"{self.path.name}: {self.layout}, input {width}x{height} {how.color} "
-            f"{'0..1' if how.unit_scale else '0..255'} by {how.resize}"
+            f"{'0..1' if how.unit_scale else '0..255'} by {how.resize}, threshold {self.threshold:g}"
         )
 
     def set_parameters(self, parameters: DetectorParameters) -> None:
@@ -86,7 +92,7 @@ class Detector:
         """Return the objects in an image (h, w, 3) BGR or (h, w) grey uint8; raises DetectorImageError for others."""
         outputs = self._session.run(self._tensor(image))
         p, size = self._parameters, (image.shape[1], image.shape[0])
-        raw = decode(self.layout, outputs, self.input_px, p.threshold)
+        raw = decode(self.layout, outputs, self.input_px, self.threshold)
         chosen = np.arange(len(raw.scores))
         if self._wanted is not None:
             chosen = chosen[np.isin(raw.class_ids, self._wanted)]

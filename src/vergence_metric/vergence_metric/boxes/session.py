@@ -108,6 +108,14 @@ class ModelSession:
         text = self.metadata.get("stride", "32")
         return int(float(text)) if text.replace(".", "", 1).isdigit() and float(text) >= 1 else 32
 
+    def own_threshold(self) -> float | None:
+        """Return the score that the file says objects should have, None if it does not."""
+        try:
+            value = float(self.metadata.get("threshold", ""))
+        except ValueError:
+            return None
+        return value if 0.0 < value < 1.0 else None
+
     def own_size_px(self) -> tuple[int, int] | None:
         """Return (width, height) that the file says it was made for, None if it does not."""
         try:
