@@ -15,6 +15,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import DescribeParameters
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Header
@@ -431,3 +432,16 @@ def test_the_serialised_message_is_what_the_middleware_makes(frame_id: str, size
     assert deserialize_message(serialised, CompressedImage) == message
     # In between and at the end the middleware pads with whatever lay in its memory.
     assert len(serialize_message(message)) - len(serialised) in range(4)
+
+
+def test_simulated_time_rules_the_stamps(graph: Any, machine: FakeMachine, start: Callable[..., CameraNode]) -> None:
+    camera = machine.plug_in(0)
+    node = start(use_sim_time=True)
+    clock = graph.client.create_publisher(Clock, "/clock", 1)
+    graph.wait_until(lambda: clock.get_subscription_count() > 0, "the node listens to the clock")
+    clock.publish(Clock(clock=from_nanoseconds(1000 * 1000 * MS)))
+    graph.wait_until(lambda: node.get_clock().now().nanoseconds == 1000 * 1000 * MS, "it has the time")
+    listener = Listener(graph, CompressedImage, "/left/image_raw/compressed")
+    push_until(graph, camera, lambda: bool(listener.messages), "a frame")
+    stamp_ns = to_nanoseconds(listener.messages[-1].header.stamp)
+    assert 999 * 1000 * MS < stamp_ns <= 1000 * 1000 * MS

@@ -33,6 +33,8 @@ from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import from_nanoseconds
 from vergence_rig.rig import default_rig, load_rig
 
+_LOOK_AROUND_NS = 200_000_000
+
 
 class CameraNode(Node):
     """Publishes one camera. `kernel` and `tree` replace the machine's own in tests; the rest goes to Node."""
@@ -65,7 +67,8 @@ class CameraNode(Node):
         diagnostics.add("controls", self._controls.report)
 
         self._health = Health()
-        self._stamper = Stamper(lambda: self.get_clock().now().nanoseconds)
+        self._stamper = Stamper(self._ros_now_ns)
+        self._look_around(time.monotonic_ns())
         source = make_source(
             settings.device, settings.source_options(), kernel=kernel, tree=self._tree, user=self._port
         )
@@ -96,13 +99,15 @@ class CameraNode(Node):
     def _deliver(self, frame: Frame, stamp: Stamp) -> None:
         """Publish one frame, in the capture thread; each form only if someone listens to it."""
         began_ns = time.monotonic_ns()
+        if began_ns >= self._look_again_ns:
+            self._look_around(began_ns)
         try:
-            if self._compressed.get_subscription_count():
+            if self._wanted[0]:
                 self._compressed.publish(self._serialise(self._jpeg(frame), stamp.ros_ns))
-            if self._info.get_subscription_count():
+            if self._wanted[1]:
                 header = self._header(stamp)
                 self._info.publish(self._calibration.message(frame.width_px, frame.height_px, header))
-            if self._raw.get_subscription_count():
+            if self._wanted[2]:
                 pixels, encoding = decode(frame)
                 self._raw.publish(array_to_image(pixels, self._header(stamp), encoding))
         except CorruptFrameError as error:
@@ -115,6 +120,16 @@ class CameraNode(Node):
         if self._partner is not None:
             self._partner.skew.own(stamp.ros_ns)
         self._health.published((stamp.age_ns + time.monotonic_ns() - began_ns) * 1e-9)
+
+    def _look_around(self, now_ns: int) -> None:
+        """See who listens and which clock rules. Doing this for every frame would cost as much as publishing it."""
+        publishers = (self._compressed, self._info, self._raw)
+        self._wanted = tuple(publisher.get_subscription_count() > 0 for publisher in publishers)
+        self._simulated = bool(self.get_parameter("use_sim_time").value)
+        self._look_again_ns = now_ns + _LOOK_AROUND_NS
+
+    def _ros_now_ns(self) -> int:
+        return self.get_clock().now().nanoseconds if self._simulated else time.time_ns()
 
     def _header(self, stamp: Stamp) -> Header:
         return Header(stamp=from_nanoseconds(stamp.ros_ns), frame_id=self._frame_id)

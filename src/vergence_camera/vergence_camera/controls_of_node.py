@@ -13,7 +13,7 @@ from vergence_camera.errors import CameraError
 from vergence_common.diagnostics import OK, WARN, Report
 
 PREFIX = "control."
-_PERIOD_S = 0.5
+_PERIOD_S = 1.0
 
 
 class NodeControls:
