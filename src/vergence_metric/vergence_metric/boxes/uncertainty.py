@@ -1,4 +1,4 @@
-"""How far off a box's sides and centres are, as fitted on held-out renders (bench row `box.*`)."""
+"""How far off a box's sides and centres are: first guesses, to be held against the bench row `box.*`."""
 
 import math
 
