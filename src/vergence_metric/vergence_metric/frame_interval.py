@@ -4,7 +4,7 @@ from bisect import bisect_left, insort
 from collections import deque
 
 WINDOW = 64
-_ENOUGH = 16
+_ENOUGH = 4
 
 
 class FrameInterval:
@@ -19,7 +19,7 @@ class FrameInterval:
         """Median interval [ns]; None before the first."""
         self.earliest_ns = 0
         """No next frame is expected sooner than this after the last [ns]: the shortest interval seen lately, less its
-        distance from the median once more. 0 until enough is known."""
+        distance from the median once more, less what few intervals cannot show. 0 at first."""
 
     def add(self, interval_ns: int) -> None:
         """Take the interval between two frames that followed one another [ns]."""
@@ -31,4 +31,4 @@ class FrameInterval:
         count = len(ordered)
         self.period_ns = median = ordered[count // 2]
         if count >= _ENOUGH:
-            self.earliest_ns = max(2 * ordered[0] - median, 0)
+            self.earliest_ns = max(2 * ordered[0] - median - 4 * median // count**2, 0)
