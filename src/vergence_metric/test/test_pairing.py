@@ -156,7 +156,7 @@ def test_the_time_limit_follows_a_slow_replay() -> None:
     for i in range(10):
         subject.add(LEFT, i * PERIOD_NS, i, 10 * i * PERIOD_NS)
     now_ns = 90 * PERIOD_NS
-    subject.add(RIGHT, 9 * PERIOD_NS + 15 * MS, 0, now_ns)
+    subject.add(RIGHT, 9 * PERIOD_NS + 16 * MS, 0, now_ns)
     assert subject.deadline_ns == now_ns + 10 * PERIOD_NS
 
 
