@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +27,7 @@ from sensor_msgs.msg import CompressedImage
 
 from bench.harness import Row
 from vergence_bringup.processes import NodeCommand, environment
+from vergence_camera.sources.recordings import AviRecording
 from vergence_common.domains import own_domain
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_nanoseconds
@@ -43,7 +44,7 @@ class Outcome:
     """What one run of a pair gave: CPU seconds per second and stream, frames lost, the nodes' own delay."""
 
     cpu: float
-    lost: int
+    lost: float
     received: int
     stamp_to_publish_ms: float
     stamp_to_receive_ms: float
@@ -57,13 +58,13 @@ def run(say: Callable[[str], None]) -> list[Row]:
             file = Path(folder) / "webcam.avi"
             mean_kb = record(file, size)
             say(f"{size[0]}x{size[1]}: pictures of {mean_kb:.0f} kB on average")
-            ours = measure([_camera_node(eye, file, size) for eye in _EYES])
-            say(f"camera_node: {100 * ours.cpu:.1f} % of a core per stream, {ours.received} frames, {ours.lost} lost")
-            peer = measure([_transcoder(eye, file) for eye in _EYES])
+            ours = measure([_camera_node(eye, file, size) for eye in _EYES], file)
+            say(f"camera_node: {100 * ours.cpu:.1f} % of a core per stream, {ours.received} frames, {ours.lost:g} lost")
+            peer = measure([_transcoder(eye, file) for eye in _EYES], file)
             say(f"decode and re-encode: {100 * peer.cpu:.1f} % of a core per stream, {peer.received} frames")
         against = "decode and re-encode (OpenCV)"
         rows += [
-            Row(f"camera.frames_lost{suffix}", ours.lost, "frames", against, peer.lost),
+            Row(f"camera.frames_lost{suffix}", ours.lost, "frames"),
             Row(f"camera.passthrough_cpu{suffix}", 100 * ours.cpu, "% of a core", against, 100 * peer.cpu),
             Row(f"camera.passthrough_cpu_ratio{suffix}", ours.cpu / peer.cpu, "of the peer's"),
             Row(f"camera.stamp_to_publish_ms{suffix}", ours.stamp_to_publish_ms, "ms"),
@@ -89,17 +90,22 @@ def record(path: Path, size_px: tuple[int, int], frames: int = 90) -> float:
     return path.stat().st_size / frames / 1e3
 
 
-def measure(commands: Sequence[Sequence[str]], duration_s: float = _MEASURE_S) -> Outcome:
-    """Run the commands as the two eyes, listen to both, and measure once both have settled."""
+def measure(commands: Sequence[Sequence[str]], file: Path, duration_s: float = _MEASURE_S) -> Outcome:
+    """Run the commands as the two eyes, listen to both, and measure once both have settled.
+
+    A frame is lost if its picture of `file` never comes although later ones do; that cannot be told of pictures that
+    were encoded anew (NaN).
+    """
+    numbers = {bytes(picture.data): number for number, picture in enumerate(AviRecording(file).pictures())}
     with own_domain() as domain, contextlib.ExitStack() as stack:
         context = Context()
         rclpy.init(args=[], context=context, domain_id=domain)
         stack.callback(context.try_shutdown)
-        listener = Listener(context)
+        listener = Listener(context, numbers)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(listener)
         processes = [stack.enter_context(_running(command, domain)) for command in commands]
-        _spin(executor, lambda: all(len(listener.stamps[eye]) > RATE_HZ for eye in _EYES), _START_S)
+        _spin(executor, lambda: all(len(listener.pictures[eye]) > RATE_HZ for eye in _EYES), _START_S)
         listener.clear()
         before, began = [_cpu_s(process.pid) for process in processes], time.monotonic()
         _spin(executor, lambda: time.monotonic() - began > duration_s, duration_s + 5.0)
@@ -107,8 +113,10 @@ def measure(commands: Sequence[Sequence[str]], duration_s: float = _MEASURE_S) -
         cpu = [(_cpu_s(p.pid) - b) / elapsed for p, b in zip(processes, before, strict=True)]
         outcome = Outcome(
             cpu=statistics.mean(cpu),
-            lost=sum(_missing(listener.stamps[eye]) for eye in _EYES),
-            received=sum(len(listener.stamps[eye]) for eye in _EYES),
+            lost=sum(_missing(pictures, len(numbers)) for pictures in listener.pictures.values())
+            if all(-1 not in pictures for pictures in listener.pictures.values())
+            else float("nan"),
+            received=sum(len(pictures) for pictures in listener.pictures.values()),
             stamp_to_publish_ms=max(listener.publish_ms.values(), default=float("nan")),
             stamp_to_receive_ms=1e3 * statistics.median(listener.delays_s),
         )
@@ -118,11 +126,12 @@ def measure(commands: Sequence[Sequence[str]], duration_s: float = _MEASURE_S) -
 
 
 class Listener(Node):
-    """The one subscriber of both streams."""
+    """The one subscriber of both streams. `numbers` maps the pictures' bytes to their place in the recording."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, numbers: Mapping[bytes, int]) -> None:
         super().__init__("bench_camera", context=context)
-        self.stamps: dict[str, list[int]] = {eye: [] for eye in _EYES}
+        self._numbers = numbers
+        self.pictures: dict[str, list[int]] = {eye: [] for eye in _EYES}
         self.delays_s: list[float] = []
         self.publish_ms: dict[str, float] = {}
         for eye in _EYES:
@@ -133,15 +142,15 @@ class Listener(Node):
 
     def clear(self) -> None:
         """Forget what came so far."""
-        for stamps in self.stamps.values():
-            stamps.clear()
+        for pictures in self.pictures.values():
+            pictures.clear()
         self.delays_s.clear()
         self.publish_ms.clear()
 
     def _take(self, eye: str, message: CompressedImage) -> None:
         stamp_ns = to_nanoseconds(message.header.stamp)
-        self.stamps[eye].append(stamp_ns)
         self.delays_s.append((time.time_ns() - stamp_ns) * 1e-9)
+        self.pictures[eye].append(self._numbers.get(bytes(message.data), -1))
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -150,11 +159,9 @@ class Listener(Node):
                     self.publish_ms[status.name] = float(entry.value)
 
 
-def _missing(stamps_ns: Sequence[int]) -> int:
-    """Return how many frames are missing between the stamps of frames that were due at a fixed rate."""
-    period_ns = 1e9 / RATE_HZ
-    steps = [after - before for before, after in itertools.pairwise(stamps_ns)]
-    return sum(max(0, round(step / period_ns) - 1) for step in steps)
+def _missing(pictures: Sequence[int], count: int) -> int:
+    """Return how many of a loop of `count` pictures are missing between those that came, by their numbers."""
+    return sum((after - before - 1) % count for before, after in itertools.pairwise(pictures))
 
 
 def _camera_node(eye: str, file: Path, size: tuple[int, int]) -> list[str]:
