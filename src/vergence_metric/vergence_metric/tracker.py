@@ -122,7 +122,9 @@ class TargetTracker:
             if not self._wants_lock:
                 return track
         if not self._wants_lock:
-            return self._without(TrackStatus.LOST, "the target was hidden too long; waiting for a saccade")
+            # A new target may have taken its place, and eyes that are held make no saccade to say so.
+            self._wants_lock = min(state.rested_s, stamp_s - self._lost_s) >= self._parameters.track_relock_s
+            return self._without(TrackStatus.LOST, "the target was hidden too long; locking anew once the eyes rest")
         if state.saccading:
             return self._without(TrackStatus.LOCKING, "the left eye is in a saccade")
         if not self._at_rest(state, before, left):
@@ -141,6 +143,9 @@ class TargetTracker:
             while self._distances[0][0] < stamp_s - p.track_saccade_s:
                 self._distances.popleft()
         before_px = self._distances[0][1] if self._distances else 0.0
+        # Eyes that jumped in depth turned to something else on the same ray.
+        if not abs(track.disparity_px) < _KEPT_SHARE * saccade_px:
+            return False
         return away_px < max(_KEPT_SHARE * saccade_px, before_px + 0.5 * saccade_px)
 
     def _at_rest(self, state: EyeState, before: Image | None, left: Image) -> bool:
