@@ -82,7 +82,7 @@ def marker_80_80() -> Station:
 
 
 def stations(baseline_m: float, short: bool = False) -> list[Station]:
-    """Return the demo's stations in order; the short demo has one of each kind."""
+    """Return the demo's stations in order; the short demo has three that rest."""
     free = [
         Station("cube_near_left", "0.4 m, 10 degrees left", "cube", _at(0.4, 10.0, 0.0)),
         Station("cube_right_up", "0.7 m, 20 degrees right, 10 up", "cube", _at(0.7, -20.0, 10.0)),
@@ -98,5 +98,5 @@ def stations(baseline_m: float, short: bool = False) -> list[Station]:
         hold_s=7.0,
     )
     if short:
-        return [cube_held(baseline_m), free[1], moving]
+        return [cube_held(baseline_m), free[1], free[2]]
     return [cube_held(baseline_m), marker_80_80(), *free, moving]
