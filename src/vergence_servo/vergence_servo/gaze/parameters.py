@@ -32,7 +32,7 @@ class GazeParameters(Parameters):
         maximum=1,
     )
     still_speed_rad_s: float = parameter(
-        2.0, "eye speed above which images are not used", unit="rad/s", minimum=0.01, maximum=10
+        0.6, "eye speed above which images are not used", unit="rad/s", minimum=0.01, maximum=10
     )
     settle_s: float = parameter(0.02, "rest before an exposure, for it to be used", unit="s", minimum=0, maximum=0.5)
     hold_tolerance_rad: float = parameter(
@@ -42,7 +42,7 @@ class GazeParameters(Parameters):
         0.85, "share of the known play that is crossed at once when a joint turns round", minimum=0, maximum=1
     )
     follow_acceleration_rad_s2: float = parameter(
-        2.0, "how fast a moving target changes its speed", unit="rad/s^2", minimum=0.01, maximum=100
+        1.0, "how fast a moving target changes its speed", unit="rad/s^2", minimum=0.01, maximum=100
     )
     still_drift_rad_sqrt_s: float = parameter(
         0.002, "random walk of a target at rest", unit="rad/sqrt(s)", minimum=0, maximum=1
