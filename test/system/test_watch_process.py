@@ -1,10 +1,13 @@
 """`vergence watch` on a pseudo-terminal beside a running servo_node."""
 
+import fcntl
 import os
 import pty
 import select
+import struct
 import subprocess
 import sys
+import termios
 import time
 from pathlib import Path
 
@@ -17,6 +20,10 @@ def test_it_draws_the_joints_until_q_is_pressed(domain_id: int, tmp_path: Path, 
     monkeypatch.setenv("ROS_HOME", str(tmp_path))
     node = subprocess.Popen([sys.executable, "-m", "vergence_servo.servo_node"], stderr=subprocess.DEVNULL)
     master, slave = pty.openpty()
+    # A terminal has a size of its own, whatever the one that runs the tests has.
+    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 60, 120, 0, 0))
+    monkeypatch.delenv("LINES", raising=False)
+    monkeypatch.delenv("COLUMNS", raising=False)
     argv = [sys.executable, "-m", "vergence_bringup.command_line", "watch"]
     watch = subprocess.Popen(argv, stdin=slave, stdout=slave, stderr=slave, start_new_session=True)
     os.close(slave)
