@@ -20,12 +20,11 @@ def test_it_draws_the_joints_until_q_is_pressed(domain_id: int, tmp_path: Path, 
     monkeypatch.setenv("ROS_HOME", str(tmp_path))
     node = subprocess.Popen([sys.executable, "-m", "vergence_servo.servo_node"], stderr=subprocess.DEVNULL)
     master, slave = pty.openpty()
-    # A terminal has a size of its own, whatever the one that runs the tests has.
+    # A terminal has a size of its own: readline may have left LINES in this process's environment, behind os.environ.
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 60, 120, 0, 0))
-    monkeypatch.delenv("LINES", raising=False)
-    monkeypatch.delenv("COLUMNS", raising=False)
+    env = {name: value for name, value in os.environ.items() if name not in ("LINES", "COLUMNS")}
     argv = [sys.executable, "-m", "vergence_bringup.command_line", "watch"]
-    watch = subprocess.Popen(argv, stdin=slave, stdout=slave, stderr=slave, start_new_session=True)
+    watch = subprocess.Popen(argv, stdin=slave, stdout=slave, stderr=slave, start_new_session=True, env=env)
     os.close(slave)
     try:
         shown, deadline_s = "", time.monotonic() + 30
