@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PointStamped
 
-from vergence_bringup.demo_recorder import GraphError, Recorder, Stamped, StereoPicture
+from vergence_bringup.demo_recorder import Recorder, Stamped, StereoPicture
 from vergence_bringup.demo_result import Floats, MetricTable, Series, StationResult
 from vergence_bringup.demo_stations import Station
 from vergence_bringup.pictures import combined_edges, with_cross, with_windows, write_image
@@ -213,6 +213,3 @@ def _series(began_s: float, states: Sequence[Stamped], edges: Sequence[Stamped],
         true_vergence_deg=np.degrees(true_vergence),
         wanted_vergence_deg=np.degrees(true_vergence + error),
     )
-
-
-__all__ = ["GraphError", "StationRunner", "tolerance_deg"]
