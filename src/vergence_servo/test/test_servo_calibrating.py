@@ -19,12 +19,14 @@ from hypothesis import strategies as st
 from vergence_rig.camera import CameraModel
 from vergence_rig.rig import CameraSpec
 from vergence_rig.servo import MG995, SG90, ServoPlant, ServoSpec
+from vergence_servo import kept_file
 from vergence_servo.calibrating import servo_file
-from vergence_servo.calibrating.axis_response import axis_response, calibrated, staircase
-from vergence_servo.calibrating.image_motion import Image, NoMotionSeenError, azimuth_difference, eye_turn
+from vergence_servo.calibrating.axis_response import axis_response, calibrated
 from vergence_servo.calibrating.jog_session import JogSession
 from vergence_servo.calibrating.visual import VisualParameters, calibrate_head
 from vergence_servo.calibration import CalibrationError, ServoCalibration, default_servos, load_servos
+from vergence_servo.image_motion import Image, NoMotionSeenError, azimuth_difference, eye_turn
+from vergence_servo.lost_motion import staircase
 
 DEG = math.pi / 180
 CAMERA = CameraModel(CameraSpec())
@@ -116,17 +118,15 @@ def test_what_is_written_can_be_read_and_the_old_file_is_kept(tmp_path: Path):
     path = tmp_path / "servos.yaml"
     servos = default_servos() | {"tilt": recorded({-45: 1980, 45: 980}).result()}
     text = servo_file.as_text(servos)
-    assert servo_file.write(path, text) is None
+    assert kept_file.replace(path, text) is None
     read = load_servos(path)
     assert read["pan_left"] == servos["pan_left"]
     assert read["tilt"].pulse_us(0.3) == pytest.approx(servos["tilt"].pulse_us(0.3), abs=1e-3)
-    assert "+    channel: 9" in servo_file.difference(path, text.replace("channel: 4", "channel: 9")).replace(
-        ", ", "\n"
-    )
-    kept = [servo_file.write(path, text), servo_file.write(path, text)]
+    assert "+    channel: 9" in kept_file.difference(path, text.replace("channel: 4", "channel: 9")).replace(", ", "\n")
+    kept = [kept_file.replace(path, text), kept_file.replace(path, text)]
     assert len(set(kept)) == 2
     assert all(old is not None and old.read_text() == text for old in kept)
-    assert sorted(p.suffix for p in tmp_path.iterdir()) == [".old", ".old", ".yaml"]
+    assert sorted(p.suffix for p in tmp_path.iterdir()) == [".bak", ".bak", ".yaml"]
 
 
 class Terminal:
@@ -191,7 +191,7 @@ def test_the_whole_dialogue_on_a_terminal(tmp_path: Path):
     found = load_servos(path)
     assert found["tilt"].pulse_us(0.0) == pytest.approx(1491)
     assert found["pan_left"].channel == 0
-    assert len(list(tmp_path.glob("servos.yaml.*.old"))) == 1
+    assert len(list(tmp_path.glob("servos.yaml.*.bak"))) == 1
 
 
 def test_saying_no_leaves_the_file(tmp_path: Path):

@@ -16,6 +16,7 @@ from typing import Any
 import yaml
 
 from vergence_rig.rig import load_rig
+from vergence_servo import kept_file
 from vergence_servo.calibrating import servo_file
 from vergence_servo.calibrating.jog_session import JogSession
 from vergence_servo.calibrating.terminal import NoTerminalError, Terminal
@@ -138,7 +139,7 @@ def _visually(
 
 def _write(options: argparse.Namespace, servos: Mapping[str, ServoCalibration]) -> int:
     text = servo_file.as_text(servos)
-    changes = servo_file.difference(options.servos, text)
+    changes = kept_file.difference(options.servos, text)
     if not changes or (options.servos.exists() and load_servos(options.servos) == servos):
         print("nothing to change")
         return 0
@@ -153,7 +154,7 @@ def _write(options: argparse.Namespace, servos: Mapping[str, ServoCalibration]) 
         if answer.lower() not in ("y", "yes"):
             print("left as it was")
             return 1
-    kept = servo_file.write(options.servos, text)
+    kept = kept_file.replace(options.servos, text)
     print(f"wrote {options.servos}" + (f"; the old one is {kept}" if kept else ""))
     return 0
 

@@ -16,8 +16,8 @@ from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_common.stamps import to_nanoseconds
 from vergence_rig.camera import CameraError, CameraModel
 from vergence_rig.rig import JOINT_NAMES
-from vergence_servo.calibrating.image_motion import Image as Pixels
 from vergence_servo.calibration import CalibrationError
+from vergence_servo.image_motion import Image as Pixels
 
 _EYES = ("left", "right")
 _SETTLE_S = 0.5

@@ -9,9 +9,10 @@ import numpy as np
 
 from vergence_rig.camera import CameraModel
 from vergence_rig.parameters import Parameters, parameter
-from vergence_servo.calibrating.axis_response import AxisResponse, axis_response, calibrated, staircase
-from vergence_servo.calibrating.image_motion import Image, azimuth_difference, eye_turn
+from vergence_servo.calibrating.axis_response import AxisResponse, axis_response, calibrated
 from vergence_servo.calibration import CalibrationError, ServoCalibration
+from vergence_servo.image_motion import Image, azimuth_difference, eye_turn
+from vergence_servo.lost_motion import staircase
 
 _EYES_OF_JOINT = {"pan_left": ("left",), "pan_right": ("right",), "tilt": ("left", "right")}
 
