@@ -22,7 +22,7 @@ AnyNode = TypeVar("AnyNode", bound=Node)
 class Graph:
     """Nodes of one test. Waiting spins the executor until a future is done or a condition holds, and fails if not."""
 
-    def __init__(self, context: Context, timeout_s: float = 20.0) -> None:
+    def __init__(self, context: Context, timeout_s: float = 60.0) -> None:
         self.context = context
         self.timeout_s = timeout_s
         self.executor = SingleThreadedExecutor(context=context)

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from vergence_servo.drivers import kernel_pwm
 from vergence_servo.drivers.fake import FakeDriver, FakeParameters
 from vergence_servo.drivers.kernel_pwm import KernelPwmDriver, KernelPwmParameters
 from vergence_servo.drivers.lgpio import LgpioDriver
@@ -54,6 +55,12 @@ class SysfsPwm:
             for name in ("duty_cycle", "period", "enable"):
                 (folder / name).write_text("0\n")
             folder.rename(self.chip / f"pwm{text}")
+
+
+@pytest.fixture(autouse=True)
+def udev_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Longer than a slow machine's thread takes to make a channel."""
+    monkeypatch.setattr(kernel_pwm, "_UDEV_PATIENCE_S", 60.0)
 
 
 @pytest.fixture
@@ -98,6 +105,24 @@ def test_kernel_pwm_reports_a_chip_that_vanishes_and_takes_it_back(sysfs: SysfsP
     assert [sysfs.read(0, name) for name in ("duty_cycle", "enable")] == [1_400_000, 1]
 
 
+def test_kernel_pwm_waits_for_udev_at_the_first_use_alone(
+    sysfs: SysfsPwm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    driver = KernelPwmDriver(KernelPwmParameters(root=str(tmp_path)))
+    driver.set_pulse_us(0, 1500.0)
+    driver.release(0)
+
+    def gone(path: Path, value: int) -> None:
+        raise FileNotFoundError(2, "No such file or directory", str(path))
+
+    waits: list[float] = []
+    monkeypatch.setattr(kernel_pwm, "_write", gone)
+    monkeypatch.setattr("vergence_servo.drivers.kernel_pwm.time.sleep", waits.append)
+    with pytest.raises(DriverIoError, match="No such file"):
+        driver.set_pulse_us(0, 1400.0)
+    assert waits == []
+
+
 def test_kernel_pwm_finds_the_chip_of_the_header(tmp_path: Path):
     fan = SysfsPwm(tmp_path, 0, 4, "1f0009c000.pwm")
     header = SysfsPwm(tmp_path, 2, 4, "1f00098000.pwm")
@@ -111,7 +136,8 @@ def test_kernel_pwm_finds_the_chip_of_the_header(tmp_path: Path):
     fan.close()
 
 
-def test_kernel_pwm_names_the_device_tree_line_and_the_group(tmp_path: Path):
+def test_kernel_pwm_names_the_device_tree_line_and_the_group(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(kernel_pwm, "_UDEV_PATIENCE_S", 0.05)
     with pytest.raises(DriverUnavailableError, match=r"dtoverlay=pwm-2chan,pin=12,func=4,pin2=13,func2=4"):
         KernelPwmDriver(KernelPwmParameters(root=str(tmp_path)))
     chip = tmp_path / "pwmchip0"
@@ -126,6 +152,7 @@ def test_kernel_pwm_permission_names_the_group(sysfs: SysfsPwm, tmp_path: Path, 
     def refuse(*_: Any, **__: Any) -> Any:
         raise PermissionError(13, "Permission denied")
 
+    monkeypatch.setattr(kernel_pwm, "_UDEV_PATIENCE_S", 0.05)
     driver = KernelPwmDriver(KernelPwmParameters(root=str(tmp_path)))
     monkeypatch.setattr("builtins.open", refuse)
     with pytest.raises(DriverIoError, match="usermod -aG gpio"):
@@ -326,7 +353,7 @@ def daemon() -> Iterator[PigpioDaemon]:
 
 
 def pigpio(daemon: PigpioDaemon) -> PigpioDriver:
-    return PigpioDriver(PigpioParameters(host="127.0.0.1", port=daemon.port))
+    return PigpioDriver(PigpioParameters(host="127.0.0.1", port=daemon.port, timeout_s=10.0))
 
 
 def test_pigpio_learns_the_daemons_sample_time(daemon: PigpioDaemon):

@@ -44,6 +44,7 @@ class KernelPwmDriver:
         self._count = _read_count(self._chip)
         self._period_ns = round(1e9 / values.frequency_hz)
         self._enabled: set[int] = set()
+        self._met: set[int] = set()
 
     def set_pulse_us(self, channel: int, pulse_us: float) -> float:
         """See ServoDriver; the channel is exported and its period set when it is first used."""
@@ -95,20 +96,27 @@ class KernelPwmDriver:
     def _prepare(self, channel: int, folder: Path) -> None:
         if not folder.is_dir():
             _write(self._chip / "export", channel)
-        deadline_s = time.monotonic() + _UDEV_PATIENCE_S
+        # Waiting holds up all servos: a channel that fails later is tried again by its ServoChannel instead.
+        deadline_s = time.monotonic() + (0.0 if channel in self._met else _UDEV_PATIENCE_S)
+        self._met.add(channel)
         while True:
             try:
-                _write(folder / "period", self._period_ns)
+                self._set_period(folder)
                 return
             except (PermissionError, FileNotFoundError):
                 # udev hands a new channel to the group gpio a moment after it appears
-                if time.monotonic() > deadline_s:
+                if time.monotonic() >= deadline_s:
                     raise
                 time.sleep(0.01)
-            except OSError as error:
-                if error.errno != errno.EINVAL or time.monotonic() > deadline_s:
-                    raise
-                _write(folder / "duty_cycle", 0)  # another period's pulse was longer than this period
+
+    def _set_period(self, folder: Path) -> None:
+        try:
+            _write(folder / "period", self._period_ns)
+        except OSError as error:
+            if error.errno != errno.EINVAL:
+                raise
+            _write(folder / "duty_cycle", 0)  # another period's pulse was longer than this period
+            _write(folder / "period", self._period_ns)
 
 
 def _find_chip(root: Path, number: int) -> Path:
