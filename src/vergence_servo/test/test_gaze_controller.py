@@ -158,12 +158,23 @@ def test_a_detected_class_is_searched_and_verged_on() -> None:
     assert np.abs(run.errors_deg[-1]).max() < 0.75
 
 
-def test_a_stream_of_points_is_followed() -> None:
+@pytest.mark.parametrize("image_latency_s", [0.03, 0.12, 0.5])
+@pytest.mark.parametrize("contrast", ["required", "when_seen", "ignored"])
+def test_a_stream_of_points_is_followed(contrast: str, image_latency_s: float) -> None:
     place = (0.6, -0.2, 0.1)
-    run = Run(rig_with(IDEAL), fixed(*place), GazeParameters(contrast="ignored"))
-    run.until(1.0, lambda time_s: [PointSighting(time_s, place, math.nan)])
+    seeing = Seeing(latency_s=image_latency_s)
+    run = Run(rig_with(IDEAL), fixed(*place), GazeParameters(contrast=contrast), seeing=seeing)
+    # Points are of the present, images of a while ago.
+    run.until(1.8, lambda time_s: [PointSighting(time_s, place, math.nan)])
     assert run.report.verged
     assert np.abs(run.errors_deg[-1]).max() < 0.25
+
+
+def test_a_stream_beside_the_eyes_images_is_not_verged() -> None:
+    named, shown = (0.6, -0.2, 0.1), (0.6, 0.1, 0.0)
+    run = Run(rig_with(IDEAL), fixed(*shown), GazeParameters())
+    run.until(1.5, lambda time_s: [PointSighting(time_s, named, math.nan)])
+    assert not any(run.verged)
 
 
 def goals_that_end(result: Result) -> list[tuple[Goal, dict[str, Any]]]:

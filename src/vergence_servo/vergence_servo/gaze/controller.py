@@ -239,13 +239,17 @@ class GazeController:
         return self._phases.phase in (Phase.VERGE, Phase.FIXATE)
 
     def _judge_pair(self, stamp_s: float, now_s: float) -> None:
-        visual, estimate = self._tracking.visual, self._tracking.estimate(stamp_s)
+        visual = self._tracking.visual
+        if self._tracking.source == "point":
+            stamp_s = self._judge.exposure_for(stamp_s, now_s)
+        estimate = self._tracking.estimate(stamp_s)
         if visual is None or estimate is None:
             return
         joints = self._history.shaft_at(stamp_s)
+        errors = estimate.joints_rad - joints if self._tracking.source == "point" else visual.error_rad
         # With an eye held there is no version to correct: what is left is vergence, and the tilt.
         judged = range(3) if self._driven[:2].all() else (2,)
-        measured = [abs(float(visual.error_rad[i])) for i in judged if self._driven[i]]
+        measured = [abs(float(errors[i])) for i in judged if self._driven[i]]
         vergence_error = estimate.vergence_rad - float(joints[1] - joints[0])
         error = max([abs(vergence_error), *(value for value in measured if math.isfinite(value))])
         # Eyes that sweep across the target are not verged on it; eyes that go along with it are.

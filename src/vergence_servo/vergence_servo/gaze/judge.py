@@ -34,6 +34,14 @@ class VergedJudge:
         if math.isfinite(stamp_s) and stamp_s >= self._contrast_s:
             self._contrast_s, self.contrast, self.edge_verged = stamp_s, contrast, edge_verged
 
+    def exposure_for(self, stamp_s: float, now_s: float) -> float:
+        """Return when a target that no image gave is to be judged: at the newest image that counts, points are younger.
+
+        However late images are, each of them then gives one verdict.
+        """
+        counts = self._p.contrast != "ignored" and now_s - self._contrast_s <= _SEEN_AGE_S
+        return min(stamp_s, self._contrast_s) if counts else stamp_s
+
     def see_pair(self, stamp_s: float, now_s: float, error_rad: float, steady: bool, resting: bool) -> bool:
         """Judge one pair in which the target was measured; returns `verged`.
 
