@@ -17,7 +17,7 @@ from vergence_common.images import array_to_image
 from vergence_common.qos import IMAGE_QOS
 from vergence_servo.calibrating import head_view_node
 from vergence_servo.calibrating.head_view_node import HeadView
-from vergence_servo.calibration import CalibrationError
+from vergence_servo.running_head_node import HeadError
 
 pytestmark = pytest.mark.graph
 
@@ -97,12 +97,12 @@ def test_nobody_to_command_and_rivals_are_named(
     monkeypatch.setattr(head_view_node, "_PATIENCE_S", 0.5)
     node = start_head(False)
     with HeadView() as view:
-        with pytest.raises(CalibrationError, match="start servo_node"):
+        with pytest.raises(HeadError, match="start servo_node"):
             view.look({})
         node.create_publisher(JointState, "joint_command", 10)
         deadline_s = time.monotonic() + 10
-        while view._node.count_publishers("joint_command") < 2:
+        while view.node.count_publishers("joint_command") < 2:
             assert time.monotonic() < deadline_s
             time.sleep(0.02)
-        with pytest.raises(CalibrationError, match="gaze_controller_node"):
+        with pytest.raises(HeadError, match="gaze_controller_node"):
             view.look({})
