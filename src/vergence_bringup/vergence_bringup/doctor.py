@@ -10,24 +10,14 @@ import subprocess
 import sys
 import sysconfig
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from vergence_bringup.processes import ProcessError, config_dir, find_executable
+from vergence_rig.finding import Finding
 
 _SHM_WANTED_MB = 64  # two cameras, three readers and slack, in segments of 16 MiB
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing looked at. `needed` says whether the demo and the nodes need it, or only some rigs."""
-
-    name: str
-    ok: bool
-    message: str
-    mend: str = ""
-    needed: bool = True
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -181,4 +171,4 @@ def _has_name(group_id: int) -> bool:
 def _cameras() -> Iterable[Finding]:
     doctor: Any = importlib.import_module("vergence_camera.doctor")
     for finding in doctor.check():
-        yield Finding(finding.name, finding.ok, finding.message, finding.mend, needed=False)
+        yield replace(finding, needed=False)  # recordings and the simulator do without

@@ -2,7 +2,6 @@
 
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,20 +58,26 @@ def machine(tmp_path: Path) -> FakeMachine:
 
 
 class MjpegServer:
-    """An HTTP camera on the loopback. `script(send)` writes the body of each connection; `send` takes bytes."""
+    """An HTTP camera on the loopback. `script(to)` writes the body of each connection.
+
+    Where the script says `to.turn()` it waits for the test's `go()`: what the test has seen so far came before.
+    """
 
     def __init__(self, script: Callable[["Connection"], None]) -> None:
         self.script = script
+        self.sent = threading.Event()
+        """Set when a script has sent everything that it sends before a stall."""
+        self.turns = threading.Semaphore(0)
         self.connections = 0
         self.requests: list[str] = []
         self._socket = socket.create_server(("127.0.0.1", 0))
         self.url = f"http://127.0.0.1:{self._socket.getsockname()[1]}/stream"
-        self._ended = threading.Event()
+        self.ended = threading.Event()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
     def _serve(self) -> None:
-        while not self._ended.is_set():
+        while not self.ended.is_set():
             try:
                 client, _ = self._socket.accept()
             except OSError:
@@ -90,12 +95,15 @@ class MjpegServer:
                 request += data
             self.requests.append(request.decode())
             try:
-                self.script(Connection(client, self._ended))
+                self.script(Connection(client, self))
             except OSError:
                 return
 
+    def go(self) -> None:
+        self.turns.release()
+
     def close(self) -> None:
-        self._ended.set()
+        self.ended.set()
         self._socket.close()
 
 
@@ -104,7 +112,7 @@ class Connection:
     """One client of the server."""
 
     socket: socket.socket
-    ended: threading.Event
+    server: MjpegServer
 
     def send(self, data: bytes) -> None:
         self.socket.sendall(data)
@@ -116,11 +124,14 @@ class Connection:
         stated = f"Content-Length: {len(data)}\r\n" if length else ""
         self.send(f"--{boundary}\r\nContent-Type: image/jpeg\r\n{stated}\r\n".encode() + data + b"\r\n")
 
-    def stall(self, seconds: float = 30.0) -> None:
-        self.ended.wait(seconds)
+    def stall(self) -> None:
+        self.server.sent.set()
+        self.server.ended.wait(300.0)
 
-    def pause(self, seconds: float) -> None:
-        time.sleep(seconds)
+    def turn(self) -> None:
+        while not self.server.turns.acquire(timeout=0.1):
+            if self.server.ended.is_set():
+                raise ConnectionAbortedError
 
 
 @pytest.fixture

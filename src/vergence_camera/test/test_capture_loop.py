@@ -2,7 +2,9 @@
 
 import queue
 import threading
+import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -20,7 +22,8 @@ from vergence_camera.health import Health
 from vergence_camera.stamps import Stamp, Stamper
 
 MODE = Mode("MJPG", 640, 480, 30.0)
-QUICK = Patience(stall_s=0.15, first_retry_s=0.005, last_retry_s=0.02)
+# Where this machine pauses, that is neither a stall nor an old frame.
+PATIENT = Patience(stall_s=60.0, max_age_s=60.0, first_retry_s=0.005, last_retry_s=0.02)
 
 
 class ScriptedSource:
@@ -61,7 +64,7 @@ class ScriptedSource:
 class Bench:
     """A loop around a scripted source, with what it delivered."""
 
-    def __init__(self, source: ScriptedSource, patience: Patience = QUICK) -> None:
+    def __init__(self, source: ScriptedSource, patience: Patience = PATIENT) -> None:
         self.source, self.health = source, Health()
         self.delivered = queue.SimpleQueue[int]()
         self.said: list[tuple[str, bool]] = []
@@ -81,21 +84,27 @@ class Bench:
         self.delivered.put(frame.sequence)
 
     def take(self, count: int) -> list[int]:
-        return [self.delivered.get(timeout=10.0) for _ in range(count)]
+        return [self.delivered.get(timeout=60.0) for _ in range(count)]
+
+    def wait_until(self, condition: Callable[[], bool], what: str) -> None:
+        until_s = time.monotonic() + 60.0
+        while not condition():
+            assert time.monotonic() < until_s, f"never: {what}"
+            time.sleep(0.002)
 
 
 @pytest.fixture
 def run() -> Iterator[Callable[..., Bench]]:
     benches: list[Bench] = []
 
-    def make(*opens: Mode | Exception, patience: Patience = QUICK) -> Bench:
+    def make(*opens: Mode | Exception, patience: Patience = PATIENT) -> Bench:
         benches.append(Bench(ScriptedSource(*opens), patience))
         benches[-1].loop.start()
         return benches[-1]
 
     yield make
     for bench in benches:
-        assert bench.loop.stop()
+        assert bench.loop.stop(timeout_s=60.0)
 
 
 def test_frames_in_order_once(run: Callable[..., Bench]) -> None:
@@ -129,11 +138,10 @@ def test_tries_again_until_it_can_be_opened(run: Callable[..., Bench]) -> None:
 
 
 def test_a_stall_is_a_fault(run: Callable[..., Bench]) -> None:
-    bench = run()
+    bench = run(patience=replace(PATIENT, stall_s=0.05))
     bench.source.play(0)
     assert bench.take(1) == [0]
-    while bench.source.opened < 2:
-        bench.over.wait(0.01)
+    bench.wait_until(lambda: bench.source.opened >= 2, "it is opened again")
     bench.source.play(1)
     assert bench.take(1) == [1]
     assert bench.health.snapshot().faults["stalled"] >= 1
@@ -148,7 +156,7 @@ def test_a_corrupt_frame_costs_only_itself(run: Callable[..., Bench]) -> None:
 
 
 def test_a_stream_of_nothing_but_corrupt_frames_is_reopened(run: Callable[..., Bench]) -> None:
-    bench = run(patience=Patience(stall_s=0.05, first_retry_s=0.005, last_retry_s=0.02))
+    bench = run(patience=replace(PATIENT, stall_s=0.05))
     stop = threading.Event()
 
     def corrupt_for_ever() -> None:
@@ -157,8 +165,7 @@ def test_a_stream_of_nothing_but_corrupt_frames_is_reopened(run: Callable[..., B
 
     feeder = threading.Thread(target=corrupt_for_ever)
     feeder.start()
-    while bench.source.opened < 2:
-        bench.over.wait(0.01)
+    bench.wait_until(lambda: bench.source.opened >= 2, "it is opened again")
     stop.set()
     feeder.join()
 
@@ -174,11 +181,10 @@ def test_another_size_after_a_reconnect_is_refused_until_it_is_right_again(run: 
 
 
 def test_frames_older_than_asked_are_dropped(run: Callable[..., Bench]) -> None:
-    bench = run(patience=Patience(stall_s=5.0, stamp_offset_s=1.0, max_age_s=0.5))
+    bench = run(patience=replace(PATIENT, stamp_offset_s=1.0, max_age_s=0.5))
     bench.source.play(0, 1)
-    while bench.health.snapshot().too_old < 2:
-        bench.over.wait(0.01)
-    bench.loop.patience = Patience(stall_s=5.0)
+    bench.wait_until(lambda: bench.health.snapshot().too_old == 2, "both are dropped")
+    bench.loop.patience = PATIENT
     bench.source.play(2)
     assert bench.take(1) == [2]
 
@@ -186,8 +192,8 @@ def test_frames_older_than_asked_are_dropped(run: Callable[..., Bench]) -> None:
 def test_a_recording_that_ends_ends_the_thread(run: Callable[..., Bench]) -> None:
     bench = run()
     bench.source.play(0, ReplayEndedError("played"))
-    assert bench.over.wait(10.0)
-    assert bench.loop.stop()
+    assert bench.over.wait(60.0)
+    assert bench.loop.stop(timeout_s=60.0)
     assert bench.health.snapshot().ended
     assert bench.source.closed >= 1
 
@@ -201,13 +207,13 @@ def test_connecting_first_in_the_callers_thread() -> None:
     bench.source.play(4)
     assert bench.take(1) == [4]
     assert bench.source.opened == 1
-    assert bench.loop.stop()
+    assert bench.loop.stop(timeout_s=60.0)
 
 
 def test_a_stuck_driver_does_not_hold_up_the_end() -> None:
     class Stuck(ScriptedSource):
         def read(self, timeout_s: float) -> Frame | None:
-            release.wait(30.0)
+            release.wait(60.0)
             return None
 
     release = threading.Event()
@@ -215,6 +221,7 @@ def test_a_stuck_driver_does_not_hold_up_the_end() -> None:
     bench.loop.start()
     assert not bench.loop.stop(timeout_s=0.1)
     release.set()
+    assert bench.loop.stop(timeout_s=60.0)
 
 
 def test_one_eyes_fault_leaves_the_other_alone(run: Callable[..., Bench]) -> None:

@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 
 from vergence_camera.devices import SystemTree
-from vergence_camera.doctor import Finding, check
+from vergence_camera.doctor import check
 from vergence_camera.fake_machine import FakeMachine
 from vergence_camera.v4l2 import structures as v4l2
-from vergence_camera.v4l2.fake_kernel import FakeCamera, FakeKernel
+from vergence_camera.v4l2.fake_camera import FakeCamera
+from vergence_camera.v4l2.fake_kernel import FakeKernel
+from vergence_rig.finding import Finding
 
 
 class Pair:
@@ -29,9 +31,9 @@ class Pair:
         for camera, rate_hz in zip(self.cameras, rates_hz, strict=True):
             self.stops.append(camera.play(lambda number: self.picture, rate_hz))
 
-    def findings(self, trial_s: float = 0.5) -> dict[str, Finding]:
+    def findings(self, patience_s: float = 60.0) -> dict[str, Finding]:
         machine = self.machine
-        found = check(kernel=machine.kernel, tree=machine.tree, trial_s=trial_s, max_skew_s=0.05)
+        found = check(kernel=machine.kernel, tree=machine.tree, trial_s=0.5, patience_s=patience_s, max_skew_s=0.05)
         assert machine.kernel.open_descriptors == []
         return {finding.name.split()[0] + finding.name[-1]: finding for finding in found}
 
@@ -56,7 +58,7 @@ def test_different_rates_and_exposures(pair: Pair) -> None:
     pair.play(30.0, 12.0)
     pair.cameras[1].controls[v4l2.CID_GAIN].value = 90
     pair.cameras[0].timestamp_flags = 0
-    findings = pair.findings(trial_s=0.8)
+    findings = pair.findings()
     assert not findings["stream2"].ok
     assert not findings["pair2"].ok
     assert "gain 16 and 90" in findings["pair2"].message
@@ -77,20 +79,20 @@ def test_a_shared_controller(machine: FakeMachine, make_jpeg: Callable[..., byte
 def test_no_bandwidth_for_the_second(pair: Pair) -> None:
     pair.cameras[1].stream_errno = errno.ENOSPC
     pair.play(30.0, 30.0)
-    finding = pair.findings(0.2)["stream2"]
+    finding = pair.findings()["stream2"]
     assert not finding.ok
     assert "USB bandwidth" in finding.message
 
 
 def test_a_camera_that_another_process_uses(pair: Pair) -> None:
     pair.cameras[0].streamer = 1
-    finding = pair.findings(0.1)["stream0"]
+    finding = pair.findings(patience_s=0.1)["stream0"]
     assert finding.ok
     assert "/diagnostics" in finding.message
 
 
 def test_silence(pair: Pair) -> None:
-    finding = pair.findings(0.1)["stream0"]
+    finding = pair.findings(patience_s=0.1)["stream0"]
     assert not finding.ok
     assert "0 frames came" in finding.message
 

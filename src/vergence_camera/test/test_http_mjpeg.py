@@ -28,16 +28,22 @@ Serve = Callable[[Callable[[Any], None]], Any]
 
 
 def source_of(url: str, request: ModeRequest | None = None) -> HttpMjpegSource:
-    return HttpMjpegSource(url, request or ModeRequest("MJPG"), open_timeout_s=2.0)
+    return HttpMjpegSource(url, request or ModeRequest("MJPG"), open_timeout_s=60.0)
 
 
-def next_frame(source: HttpMjpegSource, within_s: float = 5.0) -> Frame:
+def next_frame(source: HttpMjpegSource, within_s: float = 60.0) -> Frame:
     until = time.monotonic() + within_s
     while time.monotonic() < until:
         frame = source.read(0.1)
         if frame is not None:
             return frame
     raise AssertionError("no frame came")
+
+
+def next_frame_and_go(source: HttpMjpegSource, server: Any) -> Frame:
+    frame = next_frame(source)
+    server.go()
+    return frame
 
 
 def until_disconnected(source: HttpMjpegSource) -> tuple[list[object], str]:
@@ -58,16 +64,19 @@ def test_the_servers_bytes_arrive_untouched(http_server: Serve, make_jpeg: Make,
         to.begin()
         for number in range(5):
             to.part(make_jpeg(number), length=length)
-            to.pause(0.05)
+            if not length:
+                to.send(b"--frame\r\n")  # only the next boundary tells where a picture without a length ends
+            to.turn()
         to.stall()
 
-    source = source_of(http_server(script).url)
-    assert str(source.open()) == "MJPG 640x480 at unknown rate"
+    server = http_server(script)
+    source = source_of(server.url)
     before = time.monotonic_ns()
-    frames = [next_frame(source) for _ in range(5)]
+    assert str(source.open()) == "MJPG 640x480 at unknown rate"
+    frames = [next_frame_and_go(source, server) for _ in range(5)]
     assert [frame.data for frame in frames] == [make_jpeg(number) for number in range(5)]
     assert [frame.sequence for frame in frames] == list(range(5))
-    assert before - 2e9 < frames[0].time_ns < frames[-1].time_ns < time.monotonic_ns()
+    assert before < frames[0].time_ns < frames[-1].time_ns < time.monotonic_ns()
     source.close()
     source.close()
 
@@ -81,7 +90,7 @@ def test_a_chunked_body_in_slow_slices(http_server: Serve, make_jpeg: Make) -> N
             part = body[begin : begin + 997]
             message = f"{len(part):x};note=1\r\n".encode() + part + b"\r\n"
             to.send(message[:5])
-            to.pause(0.002)
+            time.sleep(0.002)
             to.send(message[5:])
         to.send(b"0\r\n\r\n")
         to.stall()
@@ -103,9 +112,10 @@ def test_of_frames_that_waited_only_the_newest_is_taken(http_server: Serve, make
             to.part(make_jpeg(number, 64, 48))
         to.stall()
 
-    source = source_of(http_server(script).url)
+    server = http_server(script)
+    source = source_of(server.url)
     source.open()
-    time.sleep(0.2)
+    assert server.sent.wait(60.0)
     frame = next_frame(source)
     assert frame.data == make_jpeg(5, 64, 48)
     assert (frame.sequence, frame.skipped) == (5, 5)
@@ -156,14 +166,16 @@ def test_a_damaged_frame_costs_only_itself(
         to.begin()
         for data in (make_jpeg(0), damage(make_jpeg(1), make_jpeg(1, 64, 48)), make_jpeg(2)):
             to.part(data)
-            to.pause(0.1)
+            to.turn()
         to.stall()
 
-    source = source_of(http_server(script).url)
+    server = http_server(script)
+    source = source_of(server.url)
     source.open()
-    assert next_frame(source).data == make_jpeg(0)
+    assert next_frame_and_go(source, server).data == make_jpeg(0)
     with pytest.raises(error):
         next_frame(source)
+    server.go()
     assert next_frame(source).data == make_jpeg(2)
 
 
@@ -171,20 +183,22 @@ def test_a_wrong_length_costs_one_frame_and_the_stream_is_found_again(http_serve
     def script(to: Any) -> None:
         to.begin()
         to.part(make_jpeg(0))
-        to.pause(0.1)
+        to.turn()
         to.send(b"--frame\r\nContent-Length: 100\r\n\r\n" + make_jpeg(1) + b"\r\n")
-        to.pause(0.1)
+        to.turn()
         for number in (2, 3):
             to.part(make_jpeg(number))
-            to.pause(0.1)
+            to.turn()
         to.stall()
 
-    source = source_of(http_server(script).url)
+    server = http_server(script)
+    source = source_of(server.url)
     source.open()
-    assert next_frame(source).data == make_jpeg(0)
+    assert next_frame_and_go(source, server).data == make_jpeg(0)
     with pytest.raises(CorruptFrameError):
         next_frame(source)
-    assert next_frame(source).data == make_jpeg(2)
+    server.go()
+    assert next_frame_and_go(source, server).data == make_jpeg(2)
     assert next_frame(source).data == make_jpeg(3)
 
 

@@ -10,24 +10,15 @@ from dataclasses import dataclass, field
 from vergence_camera.control_port import ControlPort
 from vergence_camera.devices import ListedDevice, SystemTree, list_devices
 from vergence_camera.errors import CameraError, CorruptFrameError, DeviceBusyError
-from vergence_camera.frame import Frame, ModeRequest
+from vergence_camera.frame import Clock, Frame, ModeRequest
 from vergence_camera.pair import Eye, SkewMeter, faults_of_pair
 from vergence_camera.v4l2.capture import V4l2Source
 from vergence_camera.v4l2.faults import camera_error
 from vergence_camera.v4l2.kernel import Kernel, LinuxKernel
+from vergence_rig.finding import Finding
 
 _TRIAL_MODE = ModeRequest("MJPG", 640, 480, 30.0)
 _HIGH_SPEED_MBPS = 480.0
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing looked at: whether it is well, what was seen, and what mends it."""
-
-    name: str
-    ok: bool
-    message: str
-    mend: str = ""
 
 
 @dataclass
@@ -40,6 +31,10 @@ class _Trial:
     error: CameraError | None = None
 
     @property
+    def length_s(self) -> float:
+        return (self.stamps_ns[-1] - self.stamps_ns[0]) * 1e-9 if self.stamps_ns else 0.0
+
+    @property
     def rate_hz(self) -> float:
         steps = [after - before for before, after in itertools.pairwise(self.stamps_ns)]
         return 1e9 / statistics.median(steps) if steps else float("nan")
@@ -50,13 +45,15 @@ def check(
     kernel: Kernel | None = None,
     tree: SystemTree | None = None,
     trial_s: float = 1.5,
+    patience_s: float = 3.0,
     max_skew_s: float = 0.017,
 ) -> list[Finding]:
     """Look at every camera, let all of them stream together for `trial_s`, and compare each two.
 
     Args:
         kernel, tree: replace the machine's own in tests.
-        trial_s: length of the trial; 0 leaves it out.
+        trial_s: length of the trial by the frames' own times; 0 leaves it out.
+        patience_s: the trial of a camera that gives fewer frames ends after this time.
         max_skew_s: largest time apart that the pairer accepts.
     """
     kernel = kernel or LinuxKernel()
@@ -68,7 +65,7 @@ def check(
         findings += _check_device(entry)
     usable = [entry for entry in listed if not entry.trouble]
     if trial_s > 0.0 and usable:
-        trials = _stream_together(kernel, usable, trial_s)
+        trials = _stream_together(kernel, usable, trial_s, patience_s)
         for entry, trial in zip(usable, trials, strict=True):
             findings.append(_check_trial(entry, trial))
         for one, other in itertools.combinations(range(len(usable)), 2):
@@ -133,11 +130,14 @@ def _mends(faults: Sequence[str]) -> str:
     return "; ".join(fault.partition(": ")[2] for fault in faults)
 
 
-def _stream_together(kernel: Kernel, entries: Sequence[ListedDevice], trial_s: float) -> list[_Trial]:
+def _stream_together(
+    kernel: Kernel, entries: Sequence[ListedDevice], trial_s: float, patience_s: float
+) -> list[_Trial]:
     trials = [_Trial() for _ in entries]
     ready = threading.Barrier(len(entries))
+    limits = (trial_s, patience_s)
     threads = [
-        threading.Thread(target=_stream, args=(kernel, entry.device.path, trial, ready, trial_s), daemon=True)
+        threading.Thread(target=_stream, args=(kernel, entry.device.path, trial, ready, *limits), daemon=True)
         for entry, trial in zip(entries, trials, strict=True)
     ]
     for thread in threads:
@@ -147,7 +147,9 @@ def _stream_together(kernel: Kernel, entries: Sequence[ListedDevice], trial_s: f
     return trials
 
 
-def _stream(kernel: Kernel, path: str, trial: _Trial, ready: threading.Barrier, trial_s: float) -> None:
+def _stream(
+    kernel: Kernel, path: str, trial: _Trial, ready: threading.Barrier, trial_s: float, patience_s: float
+) -> None:
     port = ControlPort()
     source = V4l2Source(kernel, lambda: path, path, _TRIAL_MODE, user=port)
     try:
@@ -158,8 +160,8 @@ def _stream(kernel: Kernel, path: str, trial: _Trial, ready: threading.Barrier, 
         ready.wait()
         if trial.error is not None:
             return
-        until_s = time.monotonic() + trial_s
-        while time.monotonic() < until_s:
+        until_s = time.monotonic() + patience_s
+        while trial.length_s < trial_s and time.monotonic() < until_s:
             try:
                 frame = source.read(0.1)
             except CorruptFrameError:
@@ -176,4 +178,6 @@ def _stream(kernel: Kernel, path: str, trial: _Trial, ready: threading.Barrier, 
 
 
 def _monotonic_ns(frame: Frame) -> int:
+    if frame.clock is Clock.MONOTONIC:
+        return frame.time_ns
     return time.monotonic_ns() - (frame.clock.now_ns() - frame.time_ns)

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from vergence_camera.devices import SystemTree
-from vergence_camera.v4l2.fake_kernel import FakeCamera, FakeKernel
+from vergence_camera.v4l2.fake_camera import FakeCamera
+from vergence_camera.v4l2.fake_kernel import FakeKernel
 
 
 @dataclass
