@@ -9,6 +9,7 @@ COMMANDS = {
     "demo": ("demo", "run the whole graph on the simulated head and write a report"),
     "measure": ("measure", "metric I (and II) of two stored images"),
     "calibrate": ("calibrate", "calibrate the cameras from chessboard or ChArUco views"),
+    "identify": ("identify", "latencies, pixels per radian and signs of a running head, into its YAML"),
     "watch": ("watch", "live terminal view of a running graph"),
     "doctor": ("doctor", "say what is missing on this machine and how to mend it"),
 }

@@ -5,7 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from vergence_rig.rig import JOINT_NAMES, JointSpec, Rig, RigError, default_rig, load_rig, rig_from_mapping
+from vergence_rig.rig import (
+    JOINT_NAMES,
+    JointSpec,
+    Rig,
+    RigError,
+    default_rig,
+    load_rig,
+    rig_as_mapping,
+    rig_from_mapping,
+)
 from vergence_rig.servo import IDEAL, MG995, SG90
 
 CONFIG = Path(__file__).resolve().parents[3] / "config" / "rig.yaml"
@@ -98,3 +107,10 @@ def test_clamp_holds_the_joint_limits() -> None:
 def test_rigs_are_frozen_and_comparable() -> None:
     with pytest.raises(AttributeError):
         Rig().baseline_m = 1.0  # type: ignore[misc]
+
+
+def test_a_rig_as_mapping_gives_the_same_rig() -> None:
+    slow = SG90.replaced(name="mine", speed_rad_s=7.5, command_latency_s=0.03)
+    for rig in (default_rig(), default_rig().with_servos(slow, MG995), Rig(baseline_m=0.1, minimum_vergence_rad=0.02)):
+        assert rig_from_mapping(rig_as_mapping(rig)) == rig
+        assert rig_from_mapping(rig_as_mapping(rig) | {"identified": {"anything": 1}}) == rig

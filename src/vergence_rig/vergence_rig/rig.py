@@ -170,8 +170,12 @@ def load_rig(path: str | Path) -> Rig:
 
 
 def rig_from_mapping(document: Any) -> Rig:
-    """Build a rig from nested mappings as in rig.yaml; what is left out keeps its default. Raises RigError."""
-    top = _mapping("rig", document, ("baseline_m", "left_camera", "right_camera", "joints", "minimum_vergence_rad"))
+    """Build a rig from nested mappings as in rig.yaml; what is left out keeps its default. Raises RigError.
+
+    The key `identified` is the record that `vergence identify` leaves; nothing here depends on it.
+    """
+    keys = ("baseline_m", "left_camera", "right_camera", "joints", "minimum_vergence_rad", "identified")
+    top = _mapping("rig", document, keys)
     joints = _mapping("joints", top.get("joints", {}), JOINT_NAMES)
     default = default_rig()
     return Rig(
@@ -181,6 +185,30 @@ def rig_from_mapping(document: Any) -> Rig:
         joints=Joints(*(_joint(f"joints.{name}", default.joints[name], joints.get(name, {})) for name in JOINT_NAMES)),
         minimum_vergence_rad=_number(top, "minimum_vergence_rad", default.minimum_vergence_rad),
     )
+
+
+def rig_as_mapping(rig: Rig) -> dict[str, Any]:
+    """Return a rig as nested mappings for rig.yaml: the inverse of `rig_from_mapping`, with every key."""
+    return {
+        "baseline_m": rig.baseline_m,
+        "left_camera": _entries(rig.left_camera),
+        "right_camera": _entries(rig.right_camera),
+        "joints": {
+            name: {
+                "lower_rad": joint.lower_rad,
+                "upper_rad": joint.upper_rad,
+                "max_speed_rad_s": joint.max_speed_rad_s,
+                "servo": joint.servo.name if PRESETS.get(joint.servo.name) == joint.servo else _entries(joint.servo),
+            }
+            for name, joint in rig.joints.items()
+        },
+        "minimum_vergence_rad": rig.minimum_vergence_rad,
+    }
+
+
+def _entries(parameters: Parameters) -> dict[str, Any]:
+    values = {spec.name: getattr(parameters, spec.name) for spec in parameters.specs()}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
 
 def _joint(key: str, default: JointSpec, value: Any) -> JointSpec:
