@@ -108,6 +108,14 @@ def test_a_target_goes_where_it_is_put(graph: Any, sim: SimNode) -> None:
     message.point.x, message.point.y = 0.3, 0.06
     occluder.publish(message)
     graph.wait(graph.message(TrueVergence, "ground_truth/vergence", lambda m: m.left_visible_share == 0.0))
+    message.point.y = 2.0
+    occluder.publish(message)
+    graph.wait(graph.message(TrueVergence, "ground_truth/vergence", lambda m: m.left_visible_share > 0.5))
+    distractor = graph.client.create_publisher(PointStamped, "sim/distractor_pose", 10)
+    graph.wait_until(distractor.get_subscription_count, "sim_node to listen")
+    message.point.y = 0.06
+    distractor.publish(message)
+    graph.wait(graph.message(TrueVergence, "ground_truth/vergence", lambda m: m.left_visible_share < 0.5))
     message.header.frame_id = "map"
     place.publish(message)
     status = graph.diagnostic("commands", lambda s: "map" in s.message)

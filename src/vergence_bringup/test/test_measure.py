@@ -1,6 +1,7 @@
 """`vergence measure`: the paper's flowchart on stored images, through the command line."""
 
 import json
+import math
 from pathlib import Path
 
 import cv2
@@ -8,6 +9,8 @@ import numpy as np
 import pytest
 
 from vergence_bringup.command_line import main
+from vergence_metric.boxes import Box, BoxStatus, BoxVergenceResult, Detections
+from vergence_metric.boxes.corner_metric import corner_metric
 
 EYES = ("left", "right")
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "stereo_chessboard"
@@ -85,6 +88,68 @@ def test_bad_input_is_one_line_and_status_2(pair, tmp_path, capsys, left, right,
     assert error.startswith("vergence measure: ")
     assert error.count("\n") == 1
     assert words in error or "(20, 30)" in error
+
+
+@pytest.fixture
+def models(monkeypatch):
+    """Stand in for the detector with a pair of boxes, of which the right one is cut; returns what models were asked."""
+    asked: list[str] = []
+    boxes = (
+        Box((40.0, 50.0, 140.0, 150.0), 0.9, 0, "cube"),
+        Box((28.0, 48.0, 128.0, 148.5), 0.8, 0, "cube", (True, False, False, False)),
+    )
+    nothing = Detections(np.zeros((0, 4)), np.zeros(0), np.zeros(0, np.int64), (), (621, 401))
+
+    def measure_pair(left, right, model):
+        asked.append(model)
+        return BoxVergenceResult(
+            BoxStatus.CUT, "a box is cut", nothing, nothing, *boxes, corner_metric(*boxes), center_px=(math.nan, 1.75)
+        )
+
+    monkeypatch.setattr("vergence_metric.boxes.measure_pair", measure_pair)
+    return asked
+
+
+def test_a_model_adds_metric_ii_both_ways_with_null_for_a_cut_side(pair, models, tmp_path, capsys):
+    assert main(["measure", *pair, "--model", "some.onnx", "--json", "--out", str(tmp_path)]) == 0
+    figures = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert models == ["some.onnx"]
+    box = figures["box"]
+    assert (box["class"], box["status"], box["reason"]) == ("cube", "cut", "a box is cut")
+    assert box["left_minus_right_px"] == [None, 2.0, 12.0, 1.5]
+    assert box["right_minus_left_px"] == [None, -2.0, -12.0, -1.5]
+    assert box["center_px"] == [None, 1.75]
+    assert box["scores"] == [0.9, 0.8]
+    assert box["right_xyxy_px"] == [28.0, 48.0, 128.0, 148.5]
+    assert figures["windows_px"]
+    picture = cv2.imread(str(tmp_path / "boxes.png"))
+    assert picture is not None
+    assert picture.shape == (401, 2 * 621, 3)
+
+
+def test_the_table_ends_with_the_boxes(pair, models, capsys):
+    assert main(["measure", *pair, "--model", "shipped"]) == 0
+    assert models == [""]
+    text = capsys.readouterr().out
+    assert "cube: cut (a box is cut), scores 0.90 left, 0.80 right" in text
+    assert "(-, +2.00) (+12.00, +1.50)" in text
+    assert "(-, -2.00) (-12.00, -1.50)" in text
+
+
+def test_the_shipped_detector_sees_no_cube_in_noise(pair, capsys):
+    assert main(["measure", *pair, "--model", "shipped"]) == 0
+    assert "boxes: no target" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("model", "words"), [("absent.onnx", "no such file"), ("text.onnx", "ONNX"), ("", "--model")])
+def test_a_bad_model_is_one_line_and_nothing_is_printed(pair, tmp_path, capsys, model, words):
+    (tmp_path / "text.onnx").write_text("no network")
+    assert main(["measure", *pair, "--model", model and str(tmp_path / model)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("vergence measure: ")
+    assert printed.err.count("\n") == 1
+    assert words in printed.err
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real pairs (../shared/data/stereo_chessboard) are not here")

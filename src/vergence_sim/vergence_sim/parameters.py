@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from vergence_rig.parameters import ParameterError, Parameters, parameter
 
 TARGETS = ("cube", "marker")
+DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
 MOTIONS = ("static", "step", "ramp", "sinusoid", "stations")
 _MOST_EXTRA_CUBES, _MOST_LOOK_ALIKES = 3, 6
 
@@ -46,6 +47,13 @@ class SimParameters(Parameters):
         "things in the room that are coloured or chequered like a Rubik's cube",
         minimum=0,
         maximum=_MOST_LOOK_ALIKES,
+        read_only=True,
+    )
+    distractor: str = parameter(
+        "die",
+        "what is put at sim/distractor_pose, 6 cm wide, in the cube's colours: a puzzle of so many cells a side, a "
+        "die, a plain or a striped block",
+        choices=DISTRACTORS,
         read_only=True,
     )
     samples: int = parameter(0, "samples a pixel when rendering", minimum=0, maximum=16, read_only=True)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from vergence_sim.parameters import DISTRACTORS
 from vergence_sim.surfaces import Colour, Field, Image, cloud, grain, muted, print_text, shaded, wood
 
 CUBE_COLOURS_BGR = (
@@ -169,9 +170,12 @@ def cube_faces(rng: np.random.Generator, cells: int = 3, size_px: int = 192) -> 
     return faces
 
 
-def look_alike_faces(rng: np.random.Generator, size_px: int = 128) -> list[Image]:
-    """Return six faces of what is no Rubik's cube: puzzles of another size, dice, plain and striped bricks."""
-    kind = str(rng.choice(["two", "four", "five", "die", "plain", "stripes"]))
+def look_alike_faces(rng: np.random.Generator, size_px: int = 128, kind: str = "") -> list[Image]:
+    """Return six faces of what is no Rubik's cube: puzzles of another size, dice, plain and striped bricks.
+
+    `kind` is one of DISTRACTORS; empty lets `rng` choose.
+    """
+    kind = kind or str(rng.choice(DISTRACTORS))
     cells = {"two": 2, "four": 4, "five": 5}
     if kind in cells:
         return cube_faces(rng, cells[kind], size_px)

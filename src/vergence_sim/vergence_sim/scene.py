@@ -17,7 +17,8 @@ HEAD_HEIGHT_M = 1.15
 CUBE_SIDE_M = 0.057
 MARKER_LENGTH_M, MARKER_RADIUS_M = 0.14, 0.010
 EXTRA_CUBES = ("cube2", "cube3", "cube4")
-OBJECTS = (*TARGETS, "occluder", *EXTRA_CUBES)
+DISTRACTOR_SIDE_M = 0.06
+OBJECTS = (*TARGETS, "occluder", "distractor", *EXTRA_CUBES)
 """What can be put somewhere; the extra cubes only where the room has them."""
 
 
@@ -58,6 +59,12 @@ class SceneBuilder(ModelBuilder):
             "occluder",
             self.shape("box", (0, 0, 0), (0.01, 0.09, 0.12), self._wrapped("occluder", board), name="occluder"),
         )
+
+    def distractor(self, kind: str) -> None:
+        """Put in a box of the cube's size and colours that is no Rubik's cube, of a kind of DISTRACTORS."""
+        side = DISTRACTOR_SIDE_M / 2
+        alike = self._wrapped("distractor", look_alike_faces(np.random.default_rng([self._seed, 10]), kind=kind))
+        self.movable("distractor", self.shape("box", (0, 0, 0), (side, side, side), alike, name="distractor"))
 
     def _barrel(self, radius: float, low: float, high: float) -> list[str]:
         """Return a pen's barrel from short pieces: a cube map is only fair to a piece as high as it is wide."""
@@ -185,11 +192,13 @@ def _compiled(
     mounts: tuple[tuple[float, float], ...],
     extra_cubes: int,
     look_alikes: int,
+    distractor: str,
     textured: bool,
 ) -> mujoco.MjModel:
     builder = SceneBuilder(rig, seed, samples, textured)
     # Near things first: what is drawn behind them is never textured.
     builder.targets()
+    builder.distractor(distractor)
     builder.crowd(extra_cubes, look_alikes)
     builder.furniture()
     builder.room()
@@ -212,5 +221,6 @@ def build_scene(rig: Rig, parameters: SimParameters, fovy_rad: float, textured: 
         mounts,
         parameters.extra_cubes,
         parameters.look_alikes,
+        parameters.distractor,
         textured,
     )

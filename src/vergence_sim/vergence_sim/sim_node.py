@@ -1,5 +1,6 @@
 """sim_node: the simulated head and room in real time; speaks as cameras, servos and ground truth."""
 
+import functools
 import threading
 from collections import deque
 from collections.abc import Sequence
@@ -50,8 +51,10 @@ class SimNode(Node):
         self._true_target = qos.create_publisher(PointStamped, "ground_truth/target")
         self._subscriptions_kept = [
             qos.create_subscription(JointState, "joint_command", self._on_command),
-            qos.create_subscription(PointStamped, "sim/target_pose", lambda m: self._on_place("target", m)),
-            qos.create_subscription(PointStamped, "sim/occluder_pose", lambda m: self._on_place("occluder", m)),
+            *(
+                qos.create_subscription(PointStamped, f"sim/{what}_pose", functools.partial(self._on_place, what))
+                for what in ("target", "occluder", "distractor")
+            ),
         ]
         settings.on_change(self._on_settings)
         self._notes: deque[tuple[str, Any, float]] = deque()
@@ -132,6 +135,8 @@ class SimNode(Node):
                     simulator.place_target(simulator.parameters.target, value)
                 elif kind == "occluder":
                     simulator.place_occluder(value)
+                elif kind == "distractor":
+                    simulator.place_distractor(value)
                 else:
                     simulator.set_parameters(value)
                     schedule.set_jitter(value.effective().frame_jitter_s)

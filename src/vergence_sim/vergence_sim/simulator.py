@@ -131,8 +131,8 @@ class Simulator:
     def place_object(self, name: str, point_m: Sequence[float] | Array) -> None:
         """Put any movable thing somewhere in rig_base (3,) [m]; which one is the target stays as it is.
 
-        There are both targets, `occluder`, and as many of `cube2`, `cube3`, `cube4` as `extra_cubes` asks for. What is
-        below the floor is hidden.
+        There are both targets, `occluder`, `distractor`, and as many of `cube2`, `cube3`, `cube4` as `extra_cubes` asks
+        for. What is below the floor is hidden.
         """
         place = np.asarray(point_m, np.float64)
         if name not in OBJECTS or mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, name) < 0:
@@ -145,6 +145,10 @@ class Simulator:
     def place_occluder(self, point_m: Sequence[float] | Array) -> None:
         """Put the occluder, an upright board 18 by 24 cm, somewhere in rig_base (3,) [m]."""
         self.place_object("occluder", point_m)
+
+    def place_distractor(self, point_m: Sequence[float] | Array) -> None:
+        """Put the distractor, a box 6 cm wide in the cube's colours, somewhere in rig_base (3,) [m]."""
+        self.place_object("distractor", point_m)
 
     def view(self, eye: str) -> Image:
         """Return what one eye, "left" or "right", sees now: (h, w, 3) BGR uint8."""
