@@ -1,0 +1,45 @@
+"""A pair is measured only if eyes and head stood still about its exposures, cameras and joints being known."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vergence_metric.eye_rotation.encoder import EyeRotationReading, EyeRotationStatus, VisualEncoder, not_measured
+from vergence_metric.eye_rotation.rest import joints_moved, view_moved
+from vergence_metric.joint_history import JointHistory
+from vergence_metric.pairing import Pair
+from vergence_rig.camera import CameraModel
+
+
+def measure_pair(
+    encoder: VisualEncoder,
+    before: Pair[Any],
+    pair: Pair[Any],
+    joints: JointHistory,
+    models: tuple[CameraModel, CameraModel] | None,
+) -> EyeRotationReading:
+    """Return what a pair says of the eyes' rotation; the pair before it tells whether the head moves.
+
+    Frames of the pairs have `pixels`, (h, w, 3) BGR or (h, w) grey uint8.
+    """
+    if models is None:
+        return not_measured(EyeRotationStatus.NO_CAMERA_INFO, "no camera_info for these images yet")
+    eyes = joints.at(pair.left_stamp_ns, pair.right_stamp_ns) if joints.known else None
+    if eyes is None:
+        return not_measured(EyeRotationStatus.NO_JOINTS, "no joint_states at the images' stamps")
+    stamps = (pair.left_stamp_ns, pair.right_stamp_ns)
+    moved = joints_moved(joints, min(stamps), max(stamps), encoder.parameters)
+    if not moved:
+        interval_s = (pair.left_stamp_ns - before.left_stamp_ns) * 1e-9
+        moved = view_moved(
+            _grey(before.left.pixels), _grey(pair.left.pixels), interval_s, pair.skew_ns * 1e-9, encoder.parameters
+        )
+    if moved:
+        return not_measured(EyeRotationStatus.MOVING, moved, eyes)
+    return encoder.measure(pair.left.pixels, pair.right.pixels, eyes, models)
+
+
+def _grey(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
