@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.nearest_edges import NearestEdges
-from vergence_metric.windows import Window
 
 _LATTICE = 20  # points along a window's side: the mean is within 2 % of that over every pixel
 
@@ -29,16 +28,9 @@ def chance_levels(field: NearestEdges) -> ChanceLevels:
 
     The mean is taken over a lattice of at most 20 by 20 pixels that lie evenly in the window.
     """
-    n = len(field.windows)
-    lattices = [_lattice(window) for window in field.windows]
-    squares = field.squared_distances(lattices * 2)
     means = [
-        float(np.sqrt(found, dtype=np.float64).mean()) if field.reachable(block // n, block % n) else np.nan
-        for block, found in enumerate(squares)
+        [np.sqrt(found, dtype=np.float64).mean() if found[0] < field.unreachable_px2 else np.nan for found in both]
+        for both in field.from_lattice(_LATTICE)
     ]
-    return ChanceLevels(np.array(means[:n]), np.array(means[n:]))
-
-
-def _lattice(window: Window) -> NDArray[np.int64]:
-    rows, columns = window.lattice(_LATTICE)
-    return (rows[:, None] * window.width + columns).ravel()
+    left_to_right, right_to_left = np.array(means).reshape(-1, 2).T
+    return ChanceLevels(left_to_right, right_to_left)

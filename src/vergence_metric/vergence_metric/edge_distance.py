@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.nearest_edges import LEFT_TO_RIGHT, RIGHT_TO_LEFT, NearestEdges
+from vergence_metric.nearest_edges import NearestEdges
 from vergence_metric.windows import Window
 
 
@@ -45,23 +45,16 @@ class EdgeDistances:
 
 def edge_distances(field: NearestEdges) -> EdgeDistances:
     """Return the metric in every window of `field`, equal to the pairwise definition up to float64's rounding."""
-    n = len(field.windows)
-    points = [field.edge_points(direction, i) for direction in (LEFT_TO_RIGHT, RIGHT_TO_LEFT) for i in range(n)]
-    squares = field.squared_distances(points)
-    left_count = np.array([len(p) for p in points[:n]], np.int64)
-    right_count = np.array([len(p) for p in points[n:]], np.int64)
+    squares = field.from_edges()
+    left_count, right_count = np.array([[len(one) for one in both] for both in squares], np.int64).reshape(-1, 2).T
     measurable = (left_count > 0) & (right_count > 0)
     means = [
-        np.sqrt(found, dtype=np.float64).mean() if ok else np.nan
-        for found, ok in zip(squares, np.tile(measurable, 2), strict=True)
+        [np.sqrt(found, dtype=np.float64).mean() if ok else np.nan for found in both]
+        for both, ok in zip(squares, measurable, strict=True)
     ]
-    return EdgeDistances(
-        np.array(means[:n]),
-        np.array(means[n:]),
-        left_count,
-        right_count,
-        window_status(field.windows, left_count, right_count),
-    )
+    left_to_right, right_to_left = np.array(means).reshape(-1, 2).T
+    status = window_status(field.windows, left_count, right_count)
+    return EdgeDistances(left_to_right, right_to_left, left_count, right_count, status)
 
 
 def window_status(

@@ -62,9 +62,8 @@ def automatic_thresholds(
     exceeds, so that a change of exposure or gain scales it as it scales the gradients; it never falls below
     `auto_floor`. The percentile is taken on every 4th row and column.
     """
-    sampled_x = gradient_x[::_SAMPLING, ::_SAMPLING].astype(np.int32)
-    sampled_y = gradient_y[::_SAMPLING, ::_SAMPLING].astype(np.int32)
-    magnitude = np.abs(sampled_x) + np.abs(sampled_y)
+    magnitude = np.abs(gradient_x[::_SAMPLING, ::_SAMPLING])  # no more than 1020, as Sobel's of a byte image
+    magnitude += np.abs(gradient_y[::_SAMPLING, ::_SAMPLING])
     rank = round((1.0 - parameters.auto_edge_share) * (magnitude.size - 1))
     high = max(float(np.partition(magnitude, rank, axis=None)[rank]), parameters.auto_floor)
     return parameters.auto_low_ratio * high, high
@@ -80,8 +79,7 @@ def detect_edges(grey: Grey, parameters: EdgeMetricParameters) -> Edges:
         raise ImageShapeError(f"grey image is {grey.dtype} of shape {grey.shape}: it must be (h, w) uint8")
     if parameters.blur_sigma_px > 0.0:
         grey = cv2.GaussianBlur(grey, (0, 0), parameters.blur_sigma_px)
-    gradient_x = cv2.Sobel(grey, cv2.CV_16S, 1, 0, borderType=cv2.BORDER_REPLICATE)
-    gradient_y = cv2.Sobel(grey, cv2.CV_16S, 0, 1, borderType=cv2.BORDER_REPLICATE)
+    gradient_x, gradient_y = cv2.spatialGradient(grey, borderType=cv2.BORDER_REPLICATE)  # both Sobel derivatives
     if parameters.edge_method == "fixed":
         low, high = parameters.canny_low, parameters.canny_high
     else:

@@ -11,7 +11,7 @@ Each plane is the one before with a few shifted copies of the edges laid over it
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -77,19 +77,43 @@ class OrientedField:
         return _gaussian(window.height, sigma_px)[edges.row] * _gaussian(window.width, sigma_px)[edges.column]
 
     def _mean_distances(self, image: int, truncation_px: int, points_per_side: int) -> NDArray[np.float64]:
-        inner, planes = self.windows[-1], self.images[image].planes
+        planes, places = self.images[image].planes, _lattice(self.windows, self.truncation_px, points_per_side)
         steps = radius_steps(truncation_px).astype(np.float64)
-        stride = inner.width + 2 * self.truncation_px
-        means = np.empty((len(self.windows), self.bins))
-        for i, window in enumerate(self.windows):
-            row, column = window.lattice(points_per_side)
-            row += window.top - inner.top + self.truncation_px
-            column += window.left - inner.left + self.truncation_px
-            near = np.take(planes[: len(steps)], row[:, None] * stride + column, axis=1)
-            # a bit becomes a byte of its own, so that one addition of words adds up all bins of a row's pixels
-            counts = _SPREAD[near].sum(axis=1).view(np.uint8).reshape(len(steps), -1, MOST_BINS).sum(axis=1)
-            means[i] = truncation_px - steps @ counts[:, : self.bins] / (len(row) * len(column))
-        return means
+        near = planes[: len(steps)].take(places.index, axis=1)
+        # a bit becomes a byte of its own, so that one addition of words adds up all bins of a row's pixels
+        of_rows = np.add.reduceat(_SPREAD.take(near), places.row_starts, axis=1).view(np.uint8)
+        counts = np.add.reduceat(
+            of_rows.reshape(len(steps), -1, MOST_BINS), places.window_starts, axis=1, dtype=np.int64
+        )[..., : self.bins]
+        return truncation_px - np.tensordot(steps, counts, axes=1) / places.sizes[:, None]
+
+
+@dataclass(frozen=True)
+class _Lattice:
+    """Places in a plane of pixels that lie evenly in each window.
+
+    `row_starts` says where in `index` a row of pixels begins, `window_starts` which of the rows begins a window, and
+    `sizes` how many pixels a window has.
+    """
+
+    index: NDArray[np.intp]
+    row_starts: NDArray[np.intp]
+    window_starts: NDArray[np.intp]
+    sizes: NDArray[np.intp]
+
+
+@lru_cache(maxsize=16)
+def _lattice(windows: tuple[Window, ...], margin: int, points_per_side: int) -> _Lattice:
+    outer, rows_of, sizes, places = windows[-1], [0], [], []
+    for window in windows:
+        row, column = window.lattice(points_per_side)
+        row += window.top - outer.top + margin
+        column += window.left - outer.left + margin
+        places += list(row[:, None] * (outer.width + 2 * margin) + column)
+        rows_of.append(len(places))
+        sizes.append(row.size * column.size)
+    row_starts = np.cumsum([0, *(len(row) for row in places[:-1])])
+    return _Lattice(np.concatenate(places), row_starts, np.array(rows_of[:-1]), np.array(sizes))
 
 
 _SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").view(np.uint64).ravel()

@@ -65,6 +65,18 @@ def centre_windows(sizes_px: Iterable[int], height_px: int, width_px: int) -> tu
     return tuple(centre_window(size_px, height_px, width_px) for size_px in sizes_px)
 
 
+def hull(windows: Iterable[Window]) -> Window:
+    """Return the smallest window that holds all of them: of centre windows, the largest. Empty if there are none."""
+    windows = tuple(windows)
+    return Window(
+        max((w.size_px for w in windows), default=0),
+        min((w.top for w in windows), default=0),
+        min((w.left for w in windows), default=0),
+        max((w.bottom for w in windows), default=0),
+        max((w.right for w in windows), default=0),
+    )
+
+
 def _evenly(length: int, most: int) -> NDArray[np.int64]:
     count = min(length, most)
     return ((2 * np.arange(count, dtype=np.int64) + 1) * length) // (2 * count)
