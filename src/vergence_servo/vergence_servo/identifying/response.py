@@ -24,12 +24,15 @@ _GAINS = {True: (0.75, 1.25), False: (0.4, 2.5)}
 
 @dataclass(frozen=True)
 class Response:
-    """Slopes of what was seen over what was told, (2, 2): eyes left and right, pan and tilt; with deviations."""
+    """Slopes of what was seen over what was told, (2, 2): eyes left and right, pan and tilt.
+
+    `unrelated_rad` (2, 2) is what else moved, root mean square: the play of the servo, and whatever moves by itself.
+    """
 
     joint: str
     amplitude_rad: float
     slopes: Array
-    sigmas: Array
+    unrelated_rad: Array
 
 
 @dataclass(frozen=True)
@@ -79,12 +82,12 @@ def motions(log: AxisLog, cameras: Mapping[str, EyeCamera]) -> dict[str, SeenMot
 def response(log: AxisLog, seen: Mapping[str, SeenMotion]) -> Response:
     """Return the slopes of a staircase. Raises IdentifyError where too few rests were seen."""
     stamps_s, told_rad = log.commands[:, 0], log.commands[:, 1]
-    slopes, sigmas = np.zeros((2, 2)), np.zeros((2, 2))
+    slopes, unrelated = np.zeros((2, 2)), np.zeros((2, 2))
     for row, eye in enumerate(EYES):
         for column, values in enumerate((seen[eye].pan_rad, seen[eye].tilt_rad)):
             rests = settled(seen[eye].stamps_s, values, stamps_s)
-            slopes[row, column], sigmas[row, column] = _slope(told_rad, rests, f"{log.joint}, {eye} eye")
-    return Response(log.joint, 0.5 * float(np.ptp(told_rad)), slopes, sigmas)
+            slopes[row, column], unrelated[row, column] = _slope(told_rad, rests, f"{log.joint}, {eye} eye")
+    return Response(log.joint, 0.5 * float(np.ptp(told_rad)), slopes, unrelated)
 
 
 def _slope(told_rad: Array, seen_rad: Array, where: str) -> tuple[float, float]:
@@ -95,8 +98,7 @@ def _slope(told_rad: Array, seen_rad: Array, where: str) -> tuple[float, float]:
         )
     told, seen = told_rad[known] - told_rad[known].mean(), seen_rad[known] - seen_rad[known].mean()
     slope = float(told @ seen / (told @ told))
-    residual = float(np.sqrt(np.mean((seen - slope * told) ** 2)))
-    return slope, residual / math.sqrt(float(told @ told))
+    return slope, float(np.sqrt(np.mean((seen - slope * told) ** 2)))
 
 
 def eye_gain(log: AxisLog, eye: str, seen: SeenMotion, camera: EyeCamera) -> EyeGain:

@@ -14,6 +14,7 @@ Array = npt.NDArray[np.float64]
 _LEAST_SLOPE = 0.15
 _MOST_CROSS_TALK = 0.2
 _LEAST_LIKENESS = 0.9
+_MOST_UNRELATED, _UNRELATED_PLAY_RAD = 0.4, math.radians(0.3)
 
 # Rows: left and right eye; columns: pan and tilt.
 _PATTERNS: dict[str, Array] = {
@@ -89,6 +90,13 @@ def _swap(joints: list[str], responses: Mapping[str, Response]) -> str:
 
 def _of_one(joint: str, response: Response, pattern: str, sign: int, upside_down: str) -> str:
     reach = f"told {math.degrees(response.amplitude_rad):+.1f} degrees"
+    unrelated_rad = float(response.unrelated_rad.max())
+    allowed_rad = _MOST_UNRELATED * response.amplitude_rad + _UNRELATED_PLAY_RAD
+    if unrelated_rad > allowed_rad:
+        return (
+            f"what the eyes see while {joint} moves is {math.degrees(unrelated_rad):.1f} degrees off what that would "
+            f"show: allowed is {math.degrees(allowed_rad):.1f}; something moves in view, or the whole head does"
+        )
     if pattern == "still":
         most = float(np.abs(response.slopes).max())
         return (
