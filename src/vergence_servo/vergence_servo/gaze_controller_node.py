@@ -21,7 +21,7 @@ from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_seconds
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, TargetTrack, VergenceError
+from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack, VergenceError
 from vergence_rig.camera import CameraError, CameraModel
 from vergence_rig.parameters import parameter
 from vergence_rig.rig import load_rig
@@ -82,6 +82,7 @@ class GazeControllerNode(Node):
         watch.create_subscription(
             BoxVergence, "vergence/box", lambda m: self._take(convert.box_sighting(m, self._left.fx_px))
         )
+        watch.create_subscription(EyeRotation, "vergence/eye_rotation", lambda m: self._take(convert.eye_rotation(m)))
         watch.create_subscription(PointStamped, "gaze/target", self._on_target)
         watch.create_subscription(CameraInfo, "left/camera_info", lambda m: self._on_camera(m, left=True))
         watch.create_subscription(CameraInfo, "right/camera_info", lambda m: self._on_camera(m, left=False))
@@ -204,12 +205,12 @@ class GazeControllerNode(Node):
     def _gaze_health(self) -> Report:
         if self._newest is None or not math.isfinite(self._newest.report.tilt_rad):
             return Report(WARN, "no joint_states have arrived", {"cycles": self._cycles})
-        report = self._newest.report
-        return Report(
-            OK,
-            f"{report.phase.name.lower()}: {report.reason}",
-            {"law": report.law, "mode": report.mode, "verged": report.verged, "cycles": self._cycles},
-        )
+        report, encoder = self._newest.report, self._controller.vergence_offset
+        values = {"law": report.law, "mode": report.mode, "verged": report.verged, "cycles": self._cycles}
+        values |= {"eye_rotations_believed": encoder.believed, "eye_rotations_refused": encoder.refused}
+        if encoder.refusal:
+            values["eye_rotation_refused"] = encoder.refusal
+        return Report(OK, f"{report.phase.name.lower()}: {report.reason}", values)
 
 
 def _tf_buffer(node: Node) -> Any:

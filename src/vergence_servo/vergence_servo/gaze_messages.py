@@ -12,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from vergence_common.stamps import to_seconds, to_stamp
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, TargetTrack, VergenceError
+from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack, VergenceError
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import eye_direction, eye_position
 from vergence_rig.rig import JOINT_NAMES
@@ -20,6 +20,7 @@ from vergence_servo.gaze.goals import Goal, GoalKind, Outcome
 from vergence_servo.gaze.observations import (
     BoxSighting,
     EdgeJudgement,
+    EyeRotationReading,
     FoveaDisparity,
     JointReport,
     TrackSighting,
@@ -106,6 +107,18 @@ def edge_judgement(message: EdgeVergence) -> EdgeJudgement:
         if JUDGE_WINDOWS_PX[0] <= size <= JUDGE_WINDOWS_PX[1] and not contrast >= best[0]:
             best = (contrast, 0.5 * (left + right)) if math.isfinite(contrast) else best
     return EdgeJudgement(to_seconds(message.header.stamp), best[0], best[1], message.verged)
+
+
+def eye_rotation(message: EyeRotation) -> EyeRotationReading:
+    """Return what the visual encoder read."""
+    return EyeRotationReading(
+        stamp_s=to_seconds(message.header.stamp),
+        skew_s=message.pair_skew_s,
+        vergence_rad=message.vergence_rad,
+        sigma_rad=message.sigma_rad,
+        usable=message.status == EyeRotation.STATUS_OK,
+        reason=message.reason,
+    )
 
 
 def camera_model(message: CameraInfo) -> CameraModel:

@@ -85,15 +85,19 @@ class RunningHead:
         return models
 
     def wait_for_servos(self, patience_s: float) -> None:
-        """Wait until somebody takes commands. Raises HeadError."""
+        """Wait until somebody else takes commands. Raises HeadError."""
         deadline_s = time.monotonic() + patience_s
-        while not self._command.get_subscription_count():
+        while not self._takers():
             if time.monotonic() > deadline_s:
                 raise HeadError("nobody takes joint_command: start servo_node (or sim_node) first")
             time.sleep(0.05)
 
     def on_told(self, stamp_ns: int) -> None:
         """Know that a command with this stamp goes out now."""
+
+    def _takers(self) -> list[str]:
+        infos = self.node.get_subscriptions_info_by_topic(self._command.topic_name)
+        return [info.node_name for info in infos if info.node_name != self.node.get_name()]
 
     def _tell(self) -> None:
         with self._telling:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from vergence_rig.rig import Rig
 from vergence_servo.gaze.directions import spread_of_eye
-from vergence_servo.gaze.distance import UNKNOWN, TargetPosition, VergenceOffset, joint_variances, target_position
+from vergence_servo.gaze.distance import UNKNOWN, TargetPosition, joint_variances, target_position
 from vergence_servo.gaze.frames import point_in_rig
 from vergence_servo.gaze.goal_start import WantedClass, WantedPose, start_of
 from vergence_servo.gaze.goal_watch import GoalWatch, Progress
@@ -21,7 +21,7 @@ from vergence_servo.gaze.limits import CommandLimits
 from vergence_servo.gaze.observations import (
     BoxSighting,
     EdgeJudgement,
-    EyeRotation,
+    EyeRotationReading,
     FoveaDisparity,
     JointReport,
     Observation,
@@ -34,6 +34,7 @@ from vergence_servo.gaze.report import Command, GazeReport, disparity_px, fixati
 from vergence_servo.gaze.search_pattern import Searcher
 from vergence_servo.gaze.target_filter import TargetEstimate
 from vergence_servo.gaze.tracking import SightingError, TargetTracking
+from vergence_servo.gaze.vergence_offset import VergenceOffset, farthest_offset_rad
 
 Array = npt.NDArray[np.float64]
 
@@ -58,7 +59,8 @@ class GazeController:
         self._history = JointHistory(rig)
         self._limits = CommandLimits(rig)
         self._shaft_variances = joint_variances(rig)
-        self._offset = VergenceOffset(self._shaft_variances)
+        self.vergence_offset = VergenceOffset(self._shaft_variances, farthest_offset_rad(rig))
+        """What the visual encoder has told of the shafts."""
         self._goals = GoalWatch()
         self._enabled = True
         self._pose: Array | None = None
@@ -183,15 +185,15 @@ class GazeController:
     def _observe(self, observation: Observation, now_s: float) -> None:
         if isinstance(observation, JointReport):
             if self._history.add(observation.stamp_s, observation.positions_rad) and self._tracking.note_motion():
-                self._offset.moved(observation.stamp_s)
+                self.vergence_offset.moved(observation.stamp_s)
             return
         if not self._history.known or not observation.stamp_s <= now_s + _CLOCK_JUMP_S:
             return
-        if isinstance(observation, EyeRotation):
-            if self._tracking.eyes_were_still(observation.stamp_s, observation.skew_s):
+        if isinstance(observation, EyeRotationReading):
+            if observation.usable and self._tracking.eyes_were_still(observation.stamp_s, observation.skew_s):
                 left, right, _ = self._history.shaft_at(observation.stamp_s)
-                said_rad = float(right - left)
-                self._offset.see(observation.stamp_s, observation.vergence_rad - said_rad, observation.sigma_rad)
+                difference_rad = observation.vergence_rad - float(right - left)
+                self.vergence_offset.see(observation.stamp_s, difference_rad, observation.sigma_rad)
             return
         if isinstance(observation, EdgeJudgement):
             self._image_s = now_s
@@ -410,5 +412,7 @@ class GazeController:
 
     def _position(self, estimate: TargetEstimate | None) -> TargetPosition:
         return (
-            UNKNOWN if estimate is None else target_position(estimate, self._rig, self._shaft_variances, self._offset)
+            UNKNOWN
+            if estimate is None
+            else target_position(estimate, self._rig, self._shaft_variances, self.vergence_offset)
         )

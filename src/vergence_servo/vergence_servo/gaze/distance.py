@@ -14,6 +14,7 @@ import numpy.typing as npt
 from vergence_rig.geometry import GeometryError, point_at
 from vergence_rig.rig import Rig
 from vergence_servo.gaze.target_filter import TargetEstimate
+from vergence_servo.gaze.vergence_offset import VergenceOffset
 
 Array = npt.NDArray[np.float64]
 
@@ -21,8 +22,6 @@ _TO_95_PERCENT = 1.9  # servo errors are bounded: their tails are lighter than a
 _PLAY_DOUBT = 0.22 / math.sqrt(3.0)
 """Dead band and play of a servo are each within a fifth or so of its data sheet; which side it rests on is known."""
 _SHARED_NOISE = 1.6
-_ENCODER_GATE = 16.0
-_ENCODER_FLOOR_RAD = 3.5e-4  # no lens model is exact, however many frames are averaged
 """Estimators that read the same pair share its noise, which the filter takes for independent."""
 
 
@@ -49,34 +48,6 @@ def joint_variances(rig: Rig) -> Array:
             for servo in (joint.servo for _, joint in rig.joints.items())
         ]
     )
-
-
-class VergenceOffset:
-    """How far the true vergence is from the shafts' estimated one, learnt from the visual encoder while the eyes rest.
-
-    Every move of a pan makes it unknown again: the shaft then stops elsewhere in its play.
-    """
-
-    def __init__(self, shaft_variances: Array) -> None:
-        self._prior = float(shaft_variances[0] + shaft_variances[1])
-        self.moved(-math.inf)
-
-    def moved(self, stamp_s: float) -> None:
-        """A pan has moved, at `stamp_s`."""
-        self.offset_rad, self.variance = 0.0, self._prior
-        self._rest_since_s = stamp_s
-
-    def see(self, stamp_s: float, difference_rad: float, sigma_rad: float) -> bool:
-        """Take a measured true vergence minus the shafts' at that stamp; False if it is not of this rest or no use."""
-        if not (math.isfinite(difference_rad) and 0.0 < sigma_rad < 0.1 and stamp_s > self._rest_since_s):
-            return False
-        spread = self.variance + sigma_rad**2
-        if (difference_rad - self.offset_rad) ** 2 > _ENCODER_GATE * spread:
-            return False
-        gain = self.variance / spread
-        self.offset_rad += gain * (difference_rad - self.offset_rad)
-        self.variance = max((1.0 - gain) * self.variance, min(_ENCODER_FLOOR_RAD**2, self._prior))
-        return True
 
 
 def target_position(

@@ -92,15 +92,20 @@ class EdgeJudgement:
 
 
 @dataclass(frozen=True)
-class EyeRotation:
-    """The cameras' true vergence [rad] in a pair, from background features, with its standard deviation."""
+class EyeRotationReading:
+    """The cameras' true vergence [rad] in a pair, from background features, with its standard deviation.
+
+    `usable` is False where the visual encoder could not tell; `reason` says why.
+    """
 
     stamp_s: float
     skew_s: float
     vergence_rad: float
     sigma_rad: float
+    usable: bool = True
+    reason: str = ""
 
 
 Observation: TypeAlias = (
-    JointReport | FoveaDisparity | TrackSighting | BoxSighting | PointSighting | EdgeJudgement | EyeRotation
+    JointReport | FoveaDisparity | TrackSighting | BoxSighting | PointSighting | EdgeJudgement | EyeRotationReading
 )

@@ -11,7 +11,7 @@ from std_srvs.srv import SetBool, Trigger
 from vergence_msgs.msg import GazeState
 from vergence_servo.identifying.axis_log import IdentifyError
 
-_SERVICE_PATIENCE_S = 5.0
+_SERVICE_PATIENCE_S = 10.0
 
 
 @dataclass(frozen=True)

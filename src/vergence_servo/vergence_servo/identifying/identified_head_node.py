@@ -73,7 +73,7 @@ class IdentifiedHead(RunningHead):
         self.wait_for_servos(_DISCOVERY_S)
         self._wait(lambda: len(self._present) == len(JOINT_NAMES), _DISCOVERY_S, self._no_joints)
         self._subscribe_to_images()
-        self._wait(lambda: all(self._newest.values()), _DISCOVERY_S, self._no_images)
+        self._wait(lambda: all(self._newest.values()), _PATIENCE_S, self._no_images)
         self._check_clocks()
         self._controllers.silence()
         time.sleep(0.1)  # commands on their way
