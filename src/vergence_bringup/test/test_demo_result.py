@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
+from vergence_bringup.box_figures import BoxFigures
 from vergence_bringup.demo_report import write_report
-from vergence_bringup.demo_result import MetricTable, Series, StationResult, summary, table, write_summary
+from vergence_bringup.demo_result import MetricTable, Series, StationResult, summary, table, unfinished, write_summary
 from vergence_bringup.demo_stations import cube_held, marker_80_80, stations
 
 SETTINGS = {"servo": "sg90", "cameras": "realistic", "duration_s": 1.0}
@@ -19,7 +20,6 @@ SETTINGS = {"servo": "sg90", "cameras": "realistic", "duration_s": 1.0}
 def result():
     time_s = np.linspace(0, 1, 5)
     metric = MetricTable([50, 100], [1.0, math.nan], [2.0, 3.0], [0.3, 0.4])
-    series = Series(time_s, time_s, time_s, time_s, time_s, time_s, time_s, time_s)
     return StationResult(
         "cube",
         "a cube",
@@ -35,7 +35,22 @@ def result():
         metric,
         (1.0, 0.0, 0.0),
         (1.0, 0, 0),
-        series,
+        Series(*[time_s] * 12),
+    )
+
+
+@pytest.fixture
+def boxes():
+    return BoxFigures(
+        "cut",
+        "a box is cut",
+        "cube",
+        (math.nan, 2.0, 12.0, -0.0),
+        (math.nan, 1.0),
+        (11.5, 0.25),
+        (0.75, 0.5),
+        (0.0, 1.0, 2.0, 3.0),
+        (4.0, 5.0, 6.0, 7.0),
     )
 
 
@@ -79,24 +94,58 @@ def test_table_has_every_window_and_both_directions(result):
     assert "3.00" in text
 
 
-def test_report_carries_its_pictures_and_plots(result, tmp_path):
+def test_metric_ii_stands_beside_metric_i(result, boxes):
+    with_boxes = dataclasses.replace(result, start_box=boxes, end_box=None)
+    station = summary([with_boxes], SETTINGS)["stations"][0]
+    assert station["left_to_right_px"]["start"] == [1.0, None]
+    assert station["box"]["end"] is None
+    start = station["box"]["start"]
+    assert (start["class"], start["status"], start["scores"]) == ("cube", "cut", [0.75, 0.5])
+    assert start["left_minus_right_px"] == [None, 2.0, 12.0, 0.0]
+    assert start["right_minus_left_px"] == [None, -2.0, -12.0, 0.0]
+    json.dumps(station, allow_nan=False)
+    text = table([with_boxes])
+    assert "boxes start cube: cut 0.75/0.50" in text
+    assert "L-R (-, +2.00) (+12.00, +0.00)" in text
+    assert "R-L (-, -2.00) (-12.00, +0.00)" in text
+    assert "surface +11.50" in text
+    assert summary([result], SETTINGS)["stations"][0]["box"] == {"start": None, "end": None}
+    assert "boxes" not in table([result])
+
+
+def test_a_station_that_came_to_nothing_has_its_reason_everywhere(tmp_path):
+    station = stations(0.065)[0]
+    result = unfinished(station, "waited 5 s in vain for <images>")
+    assert not result.passed
+    assert "in vain" in table([result])
+    write_summary(tmp_path / "summary.json", [result], SETTINGS)
+    stored = json.loads((tmp_path / "summary.json").read_text(), parse_constant=pytest.fail)
+    assert stored["passed"] is False
+    assert stored["stations"][0]["reason"] == result.reason
+    assert stored["stations"][0]["left_to_right_px"] == {"start": [], "end": []}
+    write_report(tmp_path / "report.html", [result], SETTINGS, tmp_path)
+    assert "in vain for &lt;images&gt;" in (tmp_path / "report.html").read_text()
+
+
+def test_report_carries_its_pictures_and_plots(result, boxes, tmp_path):
     pictures = tmp_path / "pictures"
     pictures.mkdir()
     for moment in ("start", "end"):
         for kind in ("left.jpg", "right.jpg", "left_edges.png", "right_edges.png", "combined.png"):
             cv2.imwrite(str(pictures / f"cube_{moment}_{kind}"), np.zeros((8, 8, 3), np.uint8))
-    write_report(tmp_path / "report.html", [result], SETTINGS, tmp_path)
+    write_report(tmp_path / "report.html", [dataclasses.replace(result, end_box=boxes)], SETTINGS, tmp_path)
     text = (tmp_path / "report.html").read_text()
     assert text.count("data:image/") == 10
-    assert text.count("<svg") == 2
-    assert text.count("<polyline") >= 5
+    assert text.count("<svg") == 3
+    assert text.count("<polyline") >= 8
+    assert "end, left &minus; right [px]</td><td>-</td><td>+2.00</td><td>+12.00</td>" in text
     assert "http" not in text
 
 
 def test_stations_are_what_the_paper_and_the_promise_say():
     every = stations(0.065)
-    assert len({station.name for station in every}) == len(every) == 7
-    free = [station for station in every if station.mode == "both_eyes"]
+    assert len({station.name for station in every}) == len(every) == 8
+    free = [station for station in every if station.mode == "both_eyes" and not station.by_class]
     assert sum(station.moving for station in free) == 1
     places = [station.place_m for station in free if station.place_m is not None]
     distances = [np.linalg.norm(place) for place in places]
@@ -105,6 +154,23 @@ def test_stations_are_what_the_paper_and_the_promise_say():
     assert max(distances) <= 2.0
     assert any(place[2] > 0.1 for place in places)
     assert {station.name for station in stations(0.065, short=True)} < {station.name for station in every}
+
+
+def test_the_detector_has_something_nearer_to_tell_apart():
+    (station,) = (station for station in stations(0.065) if station.by_class)
+    assert station.has_boxes
+    assert station.distractor_m is not None
+    assert station.place_m is not None
+    target, distractor = np.array(station.place_m), np.array(station.distractor_m)
+    assert np.linalg.norm(distractor) < np.linalg.norm(target)
+    # Nearer to the line of sight at the start too, and not what ends inside the foveas by mistake.
+    assert abs(math.atan2(distractor[1], distractor[0])) < abs(math.atan2(target[1], target[0]))
+    apart = math.acos(target @ distractor / np.linalg.norm(target) / np.linalg.norm(distractor))
+    assert math.degrees(apart) > 10
+
+
+def test_metric_ii_is_measured_where_a_cube_rests():
+    assert {station.name for station in stations(0.065) if not station.has_boxes} == {"paper_marker", "cube_moving"}
 
 
 def test_the_held_station_lies_on_the_left_axis():

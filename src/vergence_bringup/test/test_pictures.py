@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from vergence_bringup.pictures import PictureError, combined_edges, read_image, with_cross, with_windows, write_image
+from vergence_bringup.pictures import (
+    PictureError,
+    combined_edges,
+    read_image,
+    with_box,
+    with_cross,
+    with_windows,
+    write_image,
+)
 from vergence_bringup.plot_svg import Line, plot
 
 
@@ -39,6 +47,9 @@ def test_drawing_leaves_the_picture_alone():
     assert framed[39, 49].any()
     assert not framed[19, 29].any()
     assert with_cross(picture)[30, 40].any()
+    boxed = with_box(picture, (10.2, 20.4, 40.0, 50.0), "cube")
+    assert boxed[20:51, 10].all()
+    assert not boxed[25:45, 15:35].any()
     assert not picture.any()
 
 

@@ -2,30 +2,32 @@
 
 import argparse
 import contextlib
-import math
 import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 
-import numpy as np
 import yaml
 
 from vergence_bringup.demo_report import write_report
 from vergence_bringup.demo_result import StationResult, table, write_summary
 from vergence_bringup.demo_stations import Station, stations
+from vergence_bringup.demo_visits import Runner, visit_all
 from vergence_bringup.processes import NodeCommand, ProcessGroup, config_dir, environment
 from vergence_common.domains import own_domain
 from vergence_rig.rig import Rig, load_rig
+
+# Of metric II: it stands beside the edge metric and the simulator on two cores.
+_BOX_RATE_HZ = 6.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the subcommand."""
     parser.add_argument("--out", type=Path, default=Path("out/demo"), help="where the report goes (default: out/demo)")
-    parser.add_argument("--short", action="store_true", help="three stations instead of seven")
+    parser.add_argument("--short", action="store_true", help="three stations instead of eight")
     parser.add_argument("--ideal", action="store_true", help="ideal servos and cameras instead of realistic ones")
     parser.add_argument("--station", action="append", metavar="NAME", help="only this station (may be repeated)")
     parser.add_argument("--seed", type=int, default=0, help="of the simulator's noise and world (default: 0)")
@@ -55,11 +57,13 @@ def run(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station]) -> int:
     started = time.monotonic()
     results: list[StationResult] = []
-    _say(f"starting sim_node, edge_metric_node and gaze_controller_node (logs in {options.out / 'log'})")
+    commands = _commands(options)
+    _say(f"starting {', '.join(commands)} (logs in {options.out / 'log'})")
     with ProcessGroup(log_dir=options.out / "log") as processes:
-        for name, command in _commands(options).items():
+        for name, command in commands.items():
             processes.start(name, command)
-        _run_stations(options, rig, chosen, processes.check, results)
+        with _runner(options, rig, processes.check) as runner:
+            visit_all(runner, chosen, results, _say)
         _say("stopping the nodes")
         statuses = processes.stop()
     for name, status in statuses.items():
@@ -81,31 +85,15 @@ def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station]) -> int:
     return 0 if results and passed == len(results) and not any(statuses.values()) else 1
 
 
-def _run_stations(
-    options: argparse.Namespace,
-    rig: Rig,
-    chosen: list[Station],
-    alive: Callable[[], None],
-    results: list[StationResult],
-) -> None:
+@contextlib.contextmanager
+def _runner(options: argparse.Namespace, rig: Rig, alive: Callable[[], None]) -> Iterator[Runner]:
     # Imported late: rclpy reads the middleware's environment when it is loaded.
     from vergence_bringup.demo_recorder import Recorder
     from vergence_bringup.demo_run import StationRunner, tolerance_deg
 
     recorder = Recorder()
     try:
-        runner = StationRunner(recorder, alive, rig, tolerance_deg(rig, options.ideal), options.out)
-        _say("waiting for images, metric and controller")
-        runner.wait_until_ready()
-        for number, station in enumerate(chosen, 1):
-            _say(f"station {number} of {len(chosen)}: {station.name}: {station.title}")
-            result = runner.visit(station)
-            results.append(result)
-            verdict = "verged" if result.said_verged else f"NOT verged ({result.reason})"
-            truth = "agrees" if result.truth_agrees else "DISAGREES"
-            took = f" after {result.time_s:.2f} s" if math.isfinite(result.time_s) else ""
-            error = f"{result.true_error_deg:.2f}" if np.isfinite(result.true_error_deg) else "unknown"
-            _say(f"   graph: {verdict}{took}; truth {truth}: vergence error {error} degree")
+        yield StationRunner(recorder, alive, rig, tolerance_deg(rig, options.ideal), options.out)
     finally:
         recorder.close()
 
@@ -118,6 +106,7 @@ def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
     return {
         "sim_node": NodeCommand("vergence_sim", "sim_node", sim),
         "edge_metric_node": NodeCommand("vergence_metric", "edge_metric_node", {"rig": rig}),
+        "box_metric_node": NodeCommand("vergence_metric", "box_metric_node", {"rig": rig, "rate_hz": _BOX_RATE_HZ}),
         "gaze_controller_node": NodeCommand("vergence_servo", "gaze_controller_node", {"rig": rig}),
     }
 

@@ -17,13 +17,15 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import Image
 
+from vergence_bringup.demo_visits import GraphError
 from vergence_common.images import image_to_array
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_common.stamps import to_nanoseconds
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import EdgeVergence, GazeState, TrueVergence
+from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, TrueVergence
 
-_KEPT_IMAGES = 12
+# A second's: the boxes come after the images, the later the busier the machine.
+_KEPT_IMAGES = 30
 
 
 class Stamped(NamedTuple):
@@ -33,16 +35,13 @@ class Stamped(NamedTuple):
     message: Any
 
 
-class GraphError(RuntimeError):
-    """The graph did not answer as it must."""
-
-
 class StereoPicture(NamedTuple):
-    """One pair as it was published, with the metric computed from it."""
+    """One pair as it was published, with the metrics computed from it."""
 
     left_bgr: npt.NDArray[np.uint8]
     right_bgr: npt.NDArray[np.uint8]
     edge: EdgeVergence
+    box: BoxVergence | None
 
 
 class Recorder:
@@ -55,11 +54,13 @@ class Recorder:
         self._changed = threading.Condition()
         self.states: list[Stamped] = []
         self.edges: list[Stamped] = []
+        self.boxes: list[Stamped] = []
         self.truths: list[Stamped] = []
         self.fixations: list[Stamped] = []
         self._images: dict[str, OrderedDict[int, Image]] = {"left": OrderedDict(), "right": OrderedDict()}
         self.node.create_subscription(GazeState, "gaze/state", self._into(self.states), STATE_QOS)
         self.node.create_subscription(EdgeVergence, "vergence/edge", self._into(self.edges), STATE_QOS)
+        self.node.create_subscription(BoxVergence, "vergence/box", self._into(self.boxes), STATE_QOS)
         self.node.create_subscription(TrueVergence, "ground_truth/vergence", self._into(self.truths), STATE_QOS)
         self.node.create_subscription(PointStamped, "gaze/fixation_point", self._into(self.fixations), STATE_QOS)
         self._image_subscriptions: list[Any] = []
@@ -121,17 +122,18 @@ class Recorder:
         if not answer.result.successful:
             raise GraphError(f"{node_name} refused {values}: {answer.result.reason}")
 
-    def picture(self, alive: Callable[[], None], timeout_s: float = 5.0) -> StereoPicture:
-        """Return the next pair of images together with the metric that the graph computed from that very pair."""
+    def picture(self, with_boxes: bool, alive: Callable[[], None], timeout_s: float = 10.0) -> StereoPicture:
+        """Return the next pair of images together with the metrics that the graph computed from that very pair."""
         for images in self._images.values():
             images.clear()
         self._in_executor(self._subscribe_to_images, alive)
         try:
-            found = self.wait_for("a pair of images and its metric", self._matched, timeout_s, alive)
+            what = "a pair of images and its metrics" if with_boxes else "a pair of images and its metric"
+            found = self.wait_for(what, lambda: self._matched(with_boxes), timeout_s, alive)
         finally:
             self._in_executor(self._unsubscribe_from_images, alive)
-        left, right, edge = found
-        return StereoPicture(image_to_array(left).copy(), image_to_array(right).copy(), edge)
+        left, right, edge, box = found
+        return StereoPicture(image_to_array(left).copy(), image_to_array(right).copy(), edge, box)
 
     def _in_executor(self, work: Callable[[], None], alive: Callable[[], None]) -> None:
         # Entities must not come and go under the executor while it waits for them.
@@ -147,17 +149,20 @@ class Recorder:
             self.node.destroy_subscription(subscription)
         self._image_subscriptions = []
 
-    def _matched(self) -> tuple[Image, Image, EdgeVergence] | None:
+    def _matched(self, with_boxes: bool) -> tuple[Image, Image, EdgeVergence, BoxVergence | None] | None:
+        lately = (entry.message for entry in self.boxes[-_KEPT_IMAGES:])
+        boxes = {(to_nanoseconds(box.header.stamp), box.pair_skew_s): box for box in lately}
         for entry in reversed(self.edges[-_KEPT_IMAGES:]):
             edge = entry.message
             left_ns = to_nanoseconds(edge.header.stamp)
             left = self._images["left"].get(left_ns)
-            if left is None:
+            box = boxes.get((left_ns, edge.pair_skew_s))
+            if left is None or (with_boxes and box is None):
                 continue
             right_ns = left_ns + round(edge.pair_skew_s * 1e9)
             for stamp, right in self._images["right"].items():
                 if abs(stamp - right_ns) < 1_000_000:
-                    return left, right, edge
+                    return left, right, edge, box
         return None
 
     def _keep(self, eye: str) -> Callable[[Image], None]:

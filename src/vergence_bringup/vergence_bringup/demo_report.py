@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from vergence_bringup.demo_result import StationResult
+from vergence_bringup.box_figures import CORNERS, signed
+from vergence_bringup.demo_result import Series, StationResult
 from vergence_bringup.plot_svg import Line, plot
 
 _STYLE = """
@@ -77,6 +78,7 @@ def _station(result: StationResult, pictures: Path) -> str:
             Line("contrast", series.time_s, series.contrast, "#7c3aed"),
         ],
     )
+    figures = [vergence, metric, *_box_plot(series)]
     place = ", ".join(_text(value) for value in result.target_m)
     fixation = ", ".join(_text(value) for value in result.fixation_m)
     reason = f"<p class='bad'>{html.escape(result.reason)}</p>" if result.reason else ""
@@ -85,8 +87,9 @@ def _station(result: StationResult, pictures: Path) -> str:
             f"<h2 id='{result.name}'>{result.name}</h2><p>{html.escape(result.title)}. True target point ({place}) m; "
             f"the graph's estimate ({fixation}) m.</p>{reason}",
             *(_pictures(result.name, moment, caption, pictures) for moment, caption in _MOMENTS),
-            f"<div class='two'>{vergence}{metric}</div>",
+            f"<div class='two'>{''.join(figures)}</div>",
             _metric_table(result),
+            _box_table(result),
         )
     )
 
@@ -105,6 +108,8 @@ def _pictures(name: str, moment: str, caption: str, folder: Path) -> str:
     figures = []
     for kind, text, suffix in shown:
         file = folder / f"{name}_{moment}_{kind}.{suffix}"
+        if not file.is_file():
+            continue  # the station came to an end before
         mime = "jpeg" if suffix == "jpg" else "png"
         data = base64.b64encode(file.read_bytes()).decode("ascii")
         figures.append(
@@ -113,7 +118,48 @@ def _pictures(name: str, moment: str, caption: str, folder: Path) -> str:
     return f"<div class='row'>{''.join(figures)}</div>"
 
 
+def _box_plot(series: Series) -> list[str]:
+    if not len(series.box_time_s):
+        return []
+    title = "Metric II: disparity of the boxes' centres and of the surface inside them, against the truth"
+    lines = [
+        Line("true surface", series.truth_time_s, series.true_disparity_px, "#17803d", dashed=True),
+        Line("boxes' centres", series.box_time_s, series.box_center_px, "#b45309"),
+        Line("refined", series.box_time_s, series.box_refined_px, "#2563eb"),
+    ]
+    return [plot(title, "s", "px", lines)]
+
+
+def _box_table(result: StationResult) -> str:
+    """Return metric II at start and end; nothing where it was not measured."""
+    rows = []
+    for label, box in (("start", result.start_box), ("end", result.end_box)):
+        if box is None:
+            continue
+        first = True
+        for title, corners in (
+            ("left &minus; right", box.left_minus_right_px),
+            ("right &minus; left", box.right_minus_left_px),
+        ):
+            cells = "".join(f"<td>{signed(value)}</td>" for value in corners)
+            more = (
+                html.escape(box.seen),
+                "/".join(_text(score) for score in box.scores),
+                signed(box.center_px[0]),
+                signed(box.refined_px[0]),
+            )
+            rest = "".join(f"<td>{text}</td>" for text in more) if first else "<td></td>" * len(more)
+            rows.append(f"<tr><td>{label}, {title} [px]</td>{cells}{rest}</tr>")
+            first = False
+    if not rows:
+        return ""
+    head = "".join(f"<th>{corner}</th>" for corner in (*CORNERS, "target", "scores", "centre [px]", "refined [px]"))
+    return f"<table><tr><th>boxes</th>{head}</tr>{''.join(rows)}</table>"
+
+
 def _metric_table(result: StationResult) -> str:
+    if not result.start.windows_px:
+        return ""
     head = "".join(f"<th>{size}&times;{size}</th>" for size in result.start.windows_px)
     rows = []
     for label, metric in (("start", result.start), ("end", result.end)):

@@ -3,12 +3,15 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from vergence_bringup.box_figures import BoxFigures, corner_text, signed
+from vergence_bringup.demo_stations import Station
 
 Floats = npt.NDArray[np.float64]
 
@@ -23,18 +26,26 @@ class MetricTable:
     contrast: Sequence[float]
 
 
+def _empty() -> Floats:
+    return np.zeros(0)
+
+
 @dataclass(frozen=True)
 class Series:
     """What happened over time; `time_s` counts from the goal."""
 
-    time_s: Floats
-    metric_px: Floats  # mean of both directions in the 100 px window (or the smallest one there is)
-    contrast: Floats
-    state_time_s: Floats
-    vergence_deg: Floats  # what the controller believes
-    truth_time_s: Floats
-    true_vergence_deg: Floats
-    wanted_vergence_deg: Floats  # the vergence angle that fixates the target point
+    time_s: Floats = field(default_factory=_empty)
+    metric_px: Floats = field(default_factory=_empty)  # mean of both directions in the 100 px window, or the smallest
+    contrast: Floats = field(default_factory=_empty)
+    state_time_s: Floats = field(default_factory=_empty)
+    vergence_deg: Floats = field(default_factory=_empty)  # what the controller believes
+    truth_time_s: Floats = field(default_factory=_empty)
+    true_vergence_deg: Floats = field(default_factory=_empty)
+    wanted_vergence_deg: Floats = field(default_factory=_empty)  # the vergence angle that fixates the target point
+    true_disparity_px: Floats = field(default_factory=_empty)  # mean over what both eyes see of the target
+    box_time_s: Floats = field(default_factory=_empty)
+    box_center_px: Floats = field(default_factory=_empty)
+    box_refined_px: Floats = field(default_factory=_empty)
 
 
 @dataclass(frozen=True)
@@ -61,6 +72,8 @@ class StationResult:
     fixation_m: tuple[float, float, float]
     target_m: tuple[float, float, float]
     series: Series
+    start_box: BoxFigures | None = None
+    end_box: BoxFigures | None = None
 
     @property
     def truth_agrees(self) -> bool:
@@ -72,6 +85,31 @@ class StationResult:
     def passed(self) -> bool:
         """True if the graph said verged and the truth agrees."""
         return self.said_verged and self.truth_agrees
+
+
+_NO_TABLE = MetricTable((), (), (), ())
+_NOWHERE = (math.nan, math.nan, math.nan)
+
+
+def unfinished(station: Station, reason: str) -> StationResult:
+    """Return the result of a station that came to nothing."""
+    return StationResult(
+        name=station.name,
+        title=station.title,
+        moving=station.moving,
+        said_verged=False,
+        reason=reason,
+        time_s=math.nan,
+        true_error_deg=math.nan,
+        off_axis_deg=math.nan,
+        tolerance_deg=math.nan,
+        off_axis_tolerance_deg=math.nan,
+        start=_NO_TABLE,
+        end=_NO_TABLE,
+        fixation_m=_NOWHERE,
+        target_m=_NOWHERE,
+        series=Series(),
+    )
 
 
 def _number(value: float) -> float | None:
@@ -96,7 +134,7 @@ def summary(results: Sequence[StationResult], settings: dict[str, Any]) -> dict[
                 "reason": result.reason,
                 "time_s": _number(result.time_s),
                 "true_error_deg": _number(result.true_error_deg),
-                "tolerance_deg": result.tolerance_deg,
+                "tolerance_deg": _number(result.tolerance_deg),
                 "off_axis_deg": _number(result.off_axis_deg),
                 "windows_px": list(result.start.windows_px),
                 "left_to_right_px": {
@@ -108,6 +146,10 @@ def summary(results: Sequence[StationResult], settings: dict[str, Any]) -> dict[
                     "end": _numbers(result.end.right_to_left_px),
                 },
                 "contrast": {"start": _numbers(result.start.contrast), "end": _numbers(result.end.contrast)},
+                "box": {
+                    "start": result.start_box and result.start_box.as_json(),
+                    "end": result.end_box and result.end_box.as_json(),
+                },
                 "fixation_point_m": _numbers(result.fixation_m),
                 "target_point_m": _numbers(result.target_m),
             }
@@ -127,7 +169,7 @@ def _figure(value: float, digits: int) -> str:
 
 
 def table(results: Sequence[StationResult]) -> str:
-    """Return the table for the terminal: the verdicts, then metric I at start and end for every window."""
+    """Return the table for the terminal: the verdicts, metric I at start and end for every window, and metric II."""
     lines = [f"{'station':16} {'graph':10} {'truth':9} {'time':>6} {'true error':>11} {'off axis':>9}   metric in px"]
     for result in results:
         said = "verged" if result.said_verged else "NOT VERGED"
@@ -141,6 +183,20 @@ def table(results: Sequence[StationResult]) -> str:
             for arrow, values in (("L to R", metric.left_to_right_px), ("R to L", metric.right_to_left_px)):
                 figures = " ".join(f"{_figure(value, 2):>6}" for value in values)
                 lines.append(f"{'':71}{label:>5} {arrow} {figures}".rstrip())
+        for label, box in (("start", result.start_box), ("end", result.end_box)):
+            if box is not None:
+                lines.append(f"{'':17}boxes {label:>5} {_box_text(box)}")
         if result.reason:
             lines.append(f"{'':16} {result.reason}")
     return "\n".join(lines)
+
+
+def _box_text(box: BoxFigures) -> str:
+    scores = "/".join(_figure(score, 2) for score in box.scores)
+    if not any(math.isfinite(value) for value in box.left_minus_right_px):
+        return f"{box.seen} {scores}"
+    return (
+        f"{box.seen} {scores}  L-R {corner_text(box.left_minus_right_px)}"
+        f"  R-L {corner_text(box.right_minus_left_px)}  centre {signed(box.center_px[0])}"
+        f"  surface {signed(box.refined_px[0])}"
+    )

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PointStamped
 
+from vergence_bringup.box_figures import BoxFigures
 from vergence_bringup.demo_recorder import Recorder, Stamped, StereoPicture
 from vergence_bringup.demo_result import Floats, MetricTable, Series, StationResult
 from vergence_bringup.demo_stations import Station
-from vergence_bringup.pictures import combined_edges, with_cross, with_windows, write_image
+from vergence_bringup.pictures import Image, combined_edges, with_box, with_cross, with_windows, write_image
 from vergence_common.stamps import to_nanoseconds
 from vergence_metric.edge_metric import EdgeMetric
 from vergence_metric.edge_parameters import EdgeMetricParameters
@@ -23,6 +24,7 @@ from vergence_rig.rig import Rig
 _FOVEA_HALF_PX = 25.0
 _LIMIT_S = 12.0
 _SETTLE_S = 0.7
+_OUT_OF_SIGHT_M = (10.0, 0.0, -10.0)
 
 
 def tolerance_deg(rig: Rig, ideal: bool) -> float:
@@ -42,7 +44,10 @@ class StationRunner:
         self._tolerance_deg = tolerance_deg
         self._out_dir = out_dir
         self._edge_metric = EdgeMetric(EdgeMetricParameters())
-        self._place = recorder.node.create_publisher(PointStamped, "sim/target_pose", 10)
+        self._places = {
+            what: recorder.node.create_publisher(PointStamped, f"sim/{what}_pose", 10)
+            for what in ("target", "distractor")
+        }
 
     def wait_until_ready(self) -> None:
         """Wait until every node has been heard."""
@@ -50,44 +55,53 @@ class StationRunner:
         recorder.wait_for("ground truth from sim_node", lambda: recorder.truths, 40.0, self._alive)
         recorder.wait_for("vergence/edge from edge_metric_node", lambda: recorder.edges, 40.0, self._alive)
         recorder.wait_for("gaze/state from gaze_controller_node", lambda: recorder.states, 40.0, self._alive)
-        recorder.wait_for("sim_node to take targets", self._place.get_subscription_count, 20.0, self._alive)
+        recorder.wait_for("vergence/box from box_metric_node", lambda: recorder.boxes, 40.0, self._alive)
+        for what, publisher in self._places.items():
+            recorder.wait_for(f"sim_node to take sim/{what}_pose", publisher.get_subscription_count, 20.0, self._alive)
 
     def visit(self, station: Station) -> StationResult:
-        """Show the target, look at it as a person would who clicks on the left image, and return what happened."""
+        """Show the target, ask the graph to look at it, and return what happened.
+
+        The goal is a click on the left image, as a person would give it, or the target's class.
+        """
         recorder = self._recorder
-        self._show(station, (10.0, 0.0, -10.0))  # out of sight until the eyes are at the start
+        for what in self._places:
+            self._show(what, _OUT_OF_SIGHT_M)  # until the eyes are at the start
+        recorder.set_parameters("box_metric_node", {"enable": station.has_boxes}, self._alive)
         recorder.set_parameters("gaze_controller_node", {"mode": "both_eyes"}, self._alive)
         self._look_at_angles(station)
         recorder.settle(_SETTLE_S, self._alive)
         recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._alive)
         recorder.set_parameters("sim_node", {"target": station.target}, self._alive)
-        self._show(station, station.place_m or self._fixation_m())
+        self._show("distractor", station.distractor_m or _OUT_OF_SIGHT_M)
+        self._show("target", station.place_m or self._fixation_m())
         shown_at = recorder.now_s()
         truth = recorder.wait_for(
             f"{station.target} in both views", lambda: self._seen(station, shown_at), 10.0, self._alive
         )
-        before = recorder.picture(self._alive)
+        before = recorder.picture(station.has_boxes, self._alive)
         self._store(station, "start", before)
 
         began = recorder.now_s()
-        marks = len(recorder.states), len(recorder.edges), len(recorder.truths)
-        result = recorder.look_at(_click(truth), self._alive, _LIMIT_S + 10.0)
+        marks = len(recorder.states), len(recorder.edges), len(recorder.truths), len(recorder.boxes)
+        goal = _of_class(station.target) if station.by_class else _click(truth)
+        result = recorder.look_at(goal, self._alive, _LIMIT_S + 10.0)
         reason = "" if result.result == LookAt.Result.VERGED else result.reason
         if station.moving:
             recorder.set_parameters("sim_node", dict(station.motion), self._alive)
         recorder.settle(station.hold_s, self._alive)
-        after = recorder.picture(self._alive)
+        after = recorder.picture(station.has_boxes, self._alive)
         self._store(station, "end", after)
         if station.moving:
             recorder.set_parameters("sim_node", {"motion": "static"}, self._alive)
         return self._result(station, began, marks, reason, before, after)
 
-    def _show(self, station: Station, place_m: Sequence[float]) -> None:
+    def _show(self, what: str, place_m: Sequence[float]) -> None:
         message = PointStamped()
         message.header.stamp = self._recorder.node.get_clock().now().to_msg()
         message.header.frame_id = "rig_base"
         message.point.x, message.point.y, message.point.z = (float(value) for value in place_m)
-        self._place.publish(message)
+        self._places[what].publish(message)
 
     def _look_at_angles(self, station: Station) -> None:
         goal = LookAt.Goal(kind=LookAt.Goal.ANGLES, time_limit_s=5.0)
@@ -121,8 +135,9 @@ class StationRunner:
         windows = [int(size) for size in picture.edge.windows_px]
         left, right = measured.left_edges.mask, measured.right_edges.mask
         name = f"{station.name}_{moment}"
-        write_image(folder / f"{name}_left.jpg", with_cross(picture.left_bgr))
-        write_image(folder / f"{name}_right.jpg", with_cross(picture.right_bgr))
+        boxes = (None, None) if picture.box is None else (picture.box.left, picture.box.right)
+        for eye, view, box in zip(("left", "right"), (picture.left_bgr, picture.right_bgr), boxes, strict=True):
+            write_image(folder / f"{name}_{eye}.jpg", with_cross(_boxed(view, box)))
         write_image(folder / f"{name}_left_edges.png", left)
         write_image(folder / f"{name}_right_edges.png", right)
         write_image(folder / f"{name}_combined.png", with_windows(combined_edges(left, right), windows))
@@ -131,13 +146,18 @@ class StationRunner:
         self,
         station: Station,
         began_s: float,
-        marks: tuple[int, int, int],
+        marks: tuple[int, int, int, int],
         reason: str,
         before: StereoPicture,
         after: StereoPicture,
     ) -> StationResult:
         recorder = self._recorder
-        states, edges, truths = recorder.states[marks[0] :], recorder.edges[marks[1] :], recorder.truths[marks[2] :]
+        states, edges, truths, boxes = (
+            series[mark:]
+            for series, mark in zip(
+                (recorder.states, recorder.edges, recorder.truths, recorder.boxes), marks, strict=True
+            )
+        )
         held_from_s = recorder.now_s() - station.hold_s
         held = [entry.message.verged for entry in states if entry.arrival_s >= held_from_s]
         # Single cycles without the word are allowed, in following a moving target or on a busy machine; not the end.
@@ -171,7 +191,9 @@ class StationRunner:
             end=_table(after.edge),
             fixation_m=(fixation.x, fixation.y, fixation.z),
             target_m=(final.target_point.x, final.target_point.y, final.target_point.z),
-            series=_series(began_s, states, edges, truths),
+            series=_series(began_s, states, edges, truths, boxes),
+            start_box=before.box and BoxFigures.from_message(before.box),
+            end_box=after.box and BoxFigures.from_message(after.box),
         )
 
 
@@ -183,6 +205,18 @@ def _click(truth: Any) -> LookAt.Goal:
     return goal
 
 
+def _of_class(name: str) -> LookAt.Goal:
+    """Return the goal of one who knows what to look at and not where it is: the detector's class."""
+    return LookAt.Goal(kind=LookAt.Goal.CLASS, class_name=name, time_limit_s=_LIMIT_S)
+
+
+def _boxed(view: Image, box: Any) -> Image:
+    """Return the view with a BoundingBox drawn on it, if there is one."""
+    if box is None or not math.isfinite(box.x_min_px):
+        return view
+    return with_box(view, (box.x_min_px, box.y_min_px, box.x_max_px, box.y_max_px), f"{box.class_name} {box.score:.2f}")
+
+
 def _median_deg(values_rad: Sequence[float]) -> float:
     return math.degrees(float(np.median(np.abs(values_rad)))) if len(values_rad) else math.nan
 
@@ -192,7 +226,13 @@ def _table(edge: EdgeVergence) -> MetricTable:
     return MetricTable(windows, list(edge.left_to_right_px), list(edge.right_to_left_px), list(edge.contrast))
 
 
-def _series(began_s: float, states: Sequence[Stamped], edges: Sequence[Stamped], truths: Sequence[Stamped]) -> Series:
+def _series(
+    began_s: float,
+    states: Sequence[Stamped],
+    edges: Sequence[Stamped],
+    truths: Sequence[Stamped],
+    boxes: Sequence[Stamped],
+) -> Series:
     def stamps(entries: Sequence[Stamped]) -> Floats:
         return np.array([to_nanoseconds(entry.message.header.stamp) * 1e-9 - began_s for entry in entries])
 
@@ -212,4 +252,8 @@ def _series(began_s: float, states: Sequence[Stamped], edges: Sequence[Stamped],
         truth_time_s=stamps(truths),
         true_vergence_deg=np.degrees(true_vergence),
         wanted_vergence_deg=np.degrees(true_vergence + error),
+        true_disparity_px=np.array([entry.message.mean_disparity_px for entry in truths], np.float64),
+        box_time_s=stamps(boxes),
+        box_center_px=np.array([entry.message.center_horizontal_px for entry in boxes], np.float64),
+        box_refined_px=np.array([entry.message.refined_horizontal_px for entry in boxes], np.float64),
     )

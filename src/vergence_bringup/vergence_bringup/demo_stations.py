@@ -29,6 +29,8 @@ class Station:
         place_m: its centre in rig_base; None puts it where the graph itself computed the fixation point.
         mode: the controller's mode, left_held (the paper's) or both_eyes.
         start_version_deg, start_vergence_deg, start_tilt_deg: where the eyes are sent before the target is shown.
+        by_class: the goal is the detected class `target` instead of a click on it.
+        distractor_m: where the simulator's distractor stands meanwhile; None for none.
         motion: the simulator's motion parameters by name; empty for a target that rests.
         hold_s: how long it must stay verged.
     """
@@ -41,6 +43,8 @@ class Station:
     start_version_deg: float = 0.0
     start_vergence_deg: float = 1.0
     start_tilt_deg: float = 0.0
+    by_class: bool = False
+    distractor_m: tuple[float, float, float] | None = None
     motion: Mapping[str, float | str] = field(default_factory=dict)
     hold_s: float = 2.0
 
@@ -48,6 +52,11 @@ class Station:
     def moving(self) -> bool:
         """True if the target moves while it is looked at."""
         return bool(self.motion)
+
+    @property
+    def has_boxes(self) -> bool:
+        """True if metric II is measured: the shipped detector knows the cube alone, and pursuit needs the cores."""
+        return self.target == "cube" and not self.moving
 
 
 def cube_held(baseline_m: float) -> Station:
@@ -81,6 +90,18 @@ def marker_80_80() -> Station:
     )
 
 
+def cube_told_apart() -> Station:
+    """Return the detector's own station: a nearer thing like the cube stands before the eyes, the cube is asked for."""
+    return Station(
+        "cube_told_apart",
+        "0.65 m, asked for by its class; a look-alike stands nearer, and nearer to where the eyes look",
+        "cube",
+        _at(0.65, 8.0, 3.0),
+        by_class=True,
+        distractor_m=_at(0.42, -5.0, -1.0),
+    )
+
+
 def stations(baseline_m: float, short: bool = False) -> list[Station]:
     """Return the demo's stations in order; the short demo has three that rest."""
     free = [
@@ -99,4 +120,4 @@ def stations(baseline_m: float, short: bool = False) -> list[Station]:
     )
     if short:
         return [cube_held(baseline_m), free[1], free[2]]
-    return [cube_held(baseline_m), marker_80_80(), *free, moving]
+    return [cube_held(baseline_m), marker_80_80(), *free, cube_told_apart(), moving]

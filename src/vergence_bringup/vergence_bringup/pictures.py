@@ -57,3 +57,14 @@ def with_cross(picture: Image) -> Image:
     cv2.drawMarker(marked, centre, (0, 0, 0), cv2.MARKER_CROSS, 25, 3)
     cv2.drawMarker(marked, centre, (80, 255, 255), cv2.MARKER_CROSS, 23, 1)
     return marked
+
+
+def with_box(picture: Image, xyxy_px: Sequence[float], label: str) -> Image:
+    """Return a copy with a box (x_min, y_min, x_max, y_max) and its label drawn on it."""
+    marked = picture.copy()
+    x_min, y_min, x_max, y_max = (round(value) for value in xyxy_px)
+    place = (x_min, max(y_min - 5, 11))
+    for ink, width in (((0, 0, 0), 3), ((80, 230, 80), 1)):
+        cv2.rectangle(marked, (x_min, y_min), (x_max, y_max), ink, width)
+        cv2.putText(marked, label, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, ink, width, cv2.LINE_AA)
+    return marked
