@@ -5,21 +5,19 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from vergence_rig.geometry import rotation_rig_from_eye
 from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 from vergence_servo.gaze.controller import GazeController
 from vergence_servo.gaze.fake_head import TICK_S, FakeHead, Seeing
 from vergence_servo.gaze.goals import Goal, GoalKind
-from vergence_servo.gaze.observations import BoxSighting, EyeRotation, Observation
+from vergence_servo.gaze.observations import BoxSighting, EyeRotationReading, Observation
 from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.phases import Phase
-from vergence_servo.gaze.visual_encoder import relative_rotation
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
 
@@ -28,6 +26,10 @@ Array = npt.NDArray[np.float64]
 SERVOS: Mapping[str, ServoSpec] = {"ideal": IDEAL, "sg90": SG90, "mg995": MG995}
 CONTROL_TICKS = 3
 ENCODER_TICKS = 60
+ENCODER_LATENCY_TICKS = 27
+
+Encoder: TypeAlias = Callable[[FakeHead], EyeRotationReading | None]
+"""What the visual encoder says of a head as it stands now, if anything."""
 
 
 def tolerance_deg(servo: str) -> float:
@@ -46,7 +48,7 @@ class Scenario:
     seed: int = 0
     visible: Callable[[float], bool] = lambda time_s: True
     clutter: Callable[[float], Array] | None = None
-    encoder: bool = False
+    encoder: Encoder | None = None
 
 
 @dataclass(frozen=True)
@@ -204,6 +206,7 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
     arrived: list[Observation] = []
     samples: list[tuple[float, Array, Array, Array, bool, int, tuple[float, float, float], float]] = []
     first_result_s, travel_s, ticks, begun = math.inf, 0.0, 0, False
+    reading: EyeRotationReading | None = None
     while head.time_s < scenario.duration_s:
         arrived += head.advance()
         ticks += 1
@@ -220,8 +223,11 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
         if math.isinf(first_result_s) and any(_shows_target(observation) for observation in arrived):
             first_result_s = now_s
             travel_s = _travel_s(head)
-        if scenario.encoder and ticks % ENCODER_TICKS == 0:
-            arrived += background_rotation(head)
+        if scenario.encoder is not None and ticks % ENCODER_TICKS == 0:
+            reading = scenario.encoder(head)
+        if reading is not None and ticks % ENCODER_TICKS == ENCODER_LATENCY_TICKS:
+            arrived.append(reading)
+            reading = None
         began = time.perf_counter()
         command = controller.step(now_s, arrived)
         took_s = time.perf_counter() - began
@@ -255,26 +261,6 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
         first_result_s=first_result_s,
         travel_s=travel_s,
     )
-
-
-def background_rotation(head: FakeHead, matches: int = 250, wrong_share: float = 0.15) -> list[Observation]:
-    """Return what the visual encoder says of features of a room as the head sees them now, with wrong matches."""
-    random = np.random.default_rng(int(head.time_s * 3000.0))
-    version, tilt = 0.5 * float(head.true_rad[0] + head.true_rad[1]), float(head.true_rad[2])
-    pairs: list[Array] = []
-    while len(pairs) < matches:
-        aside, up = random.uniform(-0.45, 0.45), random.uniform(-0.38, 0.38)
-        ray = rotation_rig_from_eye(version, tilt) @ (1.0, aside, up)
-        point = ray * random.uniform(0.6, 4.0)
-        views = np.concatenate([head.project(point, left=True), head.project(point, left=False)])
-        views += random.normal(0.0, head.seeing.noise_px / head.rig.left_camera.fx_px, 4)
-        if random.random() < wrong_share:
-            views[2:] = random.uniform(-0.4, 0.4, 2)
-        pairs.append(views)
-    seen = np.array(pairs)
-    said = np.array([head.reported_rad[name] for name in JOINT_NAMES])
-    found = relative_rotation(seen[:, :2], seen[:, 2:], float(said[0]), float(said[1]))
-    return [EyeRotation(head.time_s - 0.004, 0.0, found.vergence_rad, found.sigma_rad)]
 
 
 def _begin(controller: GazeController, scenario: Scenario, head: FakeHead) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from bench.gaze_runs import Scenario
+from bench.gaze_runs import Encoder, Scenario
 
 Array = npt.NDArray[np.float64]
 
@@ -188,14 +188,18 @@ def rig_turns(count: int, given: str = "pairs", seed: int = 8) -> list[Scenario]
     return scenarios
 
 
-def at_distance(count: int, distance_m: float, encoder: bool = False, seed: int = 9) -> list[Scenario]:
-    """Targets at rest at one distance, with or without the visual encoder."""
+def at_distance(
+    count: int, distance_m: float, encoder: Callable[[int], Encoder] | None = None, seed: int = 9
+) -> list[Scenario]:
+    """Targets at rest at one distance, with or without the visual encoder that is made for a run's seed."""
     scenarios = []
     for i in range(count):
         random = np.random.default_rng([seed, i])
         point = place(distance_m, math.radians(random.uniform(-30, 30)), math.radians(random.uniform(-15, 15)))
         start = in_view_start(point, random)
-        scenarios.append(Scenario(still(point), start, 2.5, "pairs", seed=1000 * seed + i, encoder=encoder))
+        run_seed = 1000 * seed + i
+        reads = None if encoder is None else encoder(run_seed)
+        scenarios.append(Scenario(still(point), start, 2.5, "pairs", seed=run_seed, encoder=reads))
     return scenarios
 
 

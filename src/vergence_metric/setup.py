@@ -19,6 +19,7 @@ setup(
         "console_scripts": [
             "edge_metric_node = vergence_metric.edge_metric_node:main",
             "box_metric_node = vergence_metric.box_metric_node:main",
+            "eye_rotation_node = vergence_metric.eye_rotation_node:main",
         ]
     },
 )

@@ -56,6 +56,9 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument("rig", default_value=str(config / "rig.yaml"), description="the rig's description"),
             DeclareLaunchArgument("servos", default_value="true", description="run servo_node on this machine"),
             DeclareLaunchArgument("boxes", default_value="false", description="run box_metric_node, the detector"),
+            DeclareLaunchArgument(
+                "encoder", default_value="true", description="run eye_rotation_node, the visual encoder"
+            ),
             DeclareLaunchArgument("fastdds_profile", default_value=str(config / "fastdds.xml")),
             SetEnvironmentVariable("FASTRTPS_DEFAULT_PROFILES_FILE", LaunchConfiguration("fastdds_profile")),
             GroupAction(
@@ -65,6 +68,7 @@ def generate_launch_description() -> LaunchDescription:
                     camera("right"),
                     node("vergence_metric", "edge_metric_node"),
                     node("vergence_metric", "box_metric_node", "boxes"),
+                    node("vergence_metric", "eye_rotation_node", "encoder"),
                     node("vergence_servo", "gaze_controller_node"),
                     node("vergence_servo", "servo_node", "servos"),
                 ]

@@ -1,6 +1,6 @@
-"""The whole graph on the simulated head: sim_node, edge_metric_node, gaze_controller_node.
+"""The whole graph on the simulated head: sim_node, edge_metric_node, eye_rotation_node, gaze_controller_node.
 
-ros2 launch vergence_bringup sim.launch.py [preset:=ideal] [namespace:=head]
+ros2 launch vergence_bringup sim.launch.py [preset:=ideal] [encoder:=false] [namespace:=head]
 """
 
 from pathlib import Path
@@ -8,6 +8,7 @@ from pathlib import Path
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, GroupAction, SetEnvironmentVariable
+from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, PushRosNamespace
 
@@ -16,12 +17,13 @@ def generate_launch_description() -> LaunchDescription:
     config = Path(get_package_share_directory("vergence_bringup")) / "config"
     rig = LaunchConfiguration("rig")
 
-    def node(package: str, executable: str, **parameters: object) -> Node:
+    def node(package: str, executable: str, condition: str | None = None, **parameters: object) -> Node:
         return Node(
             package=package,
             executable=executable,
             output="screen",
             parameters=[str(config / f"{executable}.yaml"), {"rig": rig, **parameters}],
+            condition=IfCondition(LaunchConfiguration(condition)) if condition else None,
         )
 
     return LaunchDescription(
@@ -31,6 +33,9 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "preset", default_value="realistic", description="realistic or ideal cameras and servos"
             ),
+            DeclareLaunchArgument(
+                "encoder", default_value="true", description="run eye_rotation_node, the visual encoder"
+            ),
             DeclareLaunchArgument("fastdds_profile", default_value=str(config / "fastdds.xml")),
             SetEnvironmentVariable("FASTRTPS_DEFAULT_PROFILES_FILE", LaunchConfiguration("fastdds_profile")),
             GroupAction(
@@ -38,6 +43,7 @@ def generate_launch_description() -> LaunchDescription:
                     PushRosNamespace(LaunchConfiguration("namespace")),
                     node("vergence_sim", "sim_node", preset=LaunchConfiguration("preset")),
                     node("vergence_metric", "edge_metric_node"),
+                    node("vergence_metric", "eye_rotation_node", "encoder"),
                     node("vergence_servo", "gaze_controller_node"),
                 ]
             ),

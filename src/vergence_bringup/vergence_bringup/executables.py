@@ -20,6 +20,9 @@ EXECUTABLES: dict[str, Executable] = {
     "edge_metric_node": Executable(
         "vergence_metric", (("", "vergence_metric.edge_node_parameters:EdgeMetricNodeParameters"),)
     ),
+    "eye_rotation_node": Executable(
+        "vergence_metric", (("", "vergence_metric.eye_rotation_parameters:EyeRotationNodeParameters"),)
+    ),
     "gaze_controller_node": Executable(
         "vergence_servo", (("", "vergence_servo.gaze_controller_node:GazeNodeParameters"),)
     ),

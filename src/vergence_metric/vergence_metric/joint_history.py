@@ -27,6 +27,11 @@ class JointHistory:
         self._extrapolate_ns = extrapolate_ns
         self._samples: deque[_Sample] = deque(maxlen=4096)
 
+    @property
+    def known(self) -> bool:
+        """True once the joints have been told."""
+        return bool(self._samples)
+
     def add(self, stamp_ns: int, names: Sequence[str], positions_rad: Sequence[float]) -> bool:
         """Take a joint state; False if it lacks a joint or a position. A stamp that goes back begins anew."""
         found = dict(zip(names, positions_rad, strict=False))

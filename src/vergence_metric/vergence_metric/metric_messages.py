@@ -8,9 +8,10 @@ from std_msgs.msg import Header
 from vergence_common.stamps import to_stamp
 from vergence_metric.disparity import Disparity
 from vergence_metric.edge_metric import EdgeMetricResult
+from vergence_metric.eye_rotation.encoder import EyeRotationReading
 from vergence_metric.tracker import Track
 from vergence_metric.viewing_angles import AngularDisparity
-from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
+from vergence_msgs.msg import EdgeVergence, EyeRotation, TargetTrack, VergenceError
 
 
 def edge_message(result: EdgeMetricResult, verged: bool, header: Header, pair_skew_s: float) -> EdgeVergence:
@@ -85,3 +86,29 @@ def track_message(
         status=int(track.status),
         reason=track.reason,
     )
+
+
+def eye_rotation_message(reading: EyeRotationReading, header: Header, pair_skew_s: float) -> EyeRotation:
+    """Return what the visual encoder read in a pair; angles are NaN unless they are to be believed."""
+    rotation = reading.rotation
+    message = EyeRotation(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        vergence_rad=math.nan,
+        sigma_rad=math.nan,
+        joint_vergence_rad=reading.joint_vergence_rad,
+        corrections_rad=np.full(5, math.nan),
+        covariance_rad2=np.full(25, math.nan),
+        corners=reading.corners,
+        matches=reading.matches,
+        inliers=rotation.inliers if rotation else 0,
+        residual_px=reading.residual_px,
+        took_s=reading.took_s,
+        status=int(reading.status),
+        reason=reading.reason,
+    )
+    if reading.ok and rotation is not None:
+        message.vergence_rad, message.sigma_rad = rotation.vergence_rad, rotation.sigma_rad
+        message.corrections_rad = rotation.corrections_rad
+        message.covariance_rad2 = rotation.covariance_rad2.reshape(-1)
+    return message

@@ -42,11 +42,20 @@ class ImageFrame:
 ImagePair = Pair[ImageFrame]
 
 
+@dataclass(frozen=True, slots=True)
+class _Undecoded:
+    """One eye's image as it came."""
+
+    message: Any
+    arrived_ns: int
+
+
 class StereoInput:
     """Subscribes both eyes, gives every pair of images of one size to `on_pair`, and reports on all of it.
 
     `on_pair` runs in the executor's thread and should only hand the pair on. `models` holds the left and the right
-    camera as camera_info describes them, None before.
+    camera as camera_info describes them, None before. With `wanted`, only
+    pairs whose left stamp [ns] it wants are decoded, and then both images at once; the others only count as received.
     """
 
     def __init__(
@@ -56,13 +65,15 @@ class StereoInput:
         diagnostics: Diagnostics,
         qos: QosWatch,
         on_pair: Callable[[ImagePair], None],
+        wanted: Callable[[int], bool] | None = None,
     ) -> None:
         self.models: list[CameraModel | None] = [None, None]
         self.decode_times = StageTimes()
         self._node = node
         self._parameters = parameters
         self._on_pair = on_pair
-        self._pairer: StereoPairer[ImageFrame] = StereoPairer(parameters)
+        self._wanted = wanted
+        self._pairer: StereoPairer[Any] = StereoPairer(parameters)
         self._size_mismatch: str | None = None
         self._size_mismatches = 0
         self._info_errors: list[str | None] = [None, None]
@@ -98,28 +109,52 @@ class StereoInput:
     def _on_image(self, side: int, message: Any) -> None:
         now_ns = monotonic_ns()
         health = self._health[side]
-        try:
-            with self.decode_times.measure("decode"):
-                pixels = self._to_pixels(message)
-        except ImageError as error:
-            health.refuse(now_ns * 1e-9, str(error))
-            self._node.get_logger().warning(f"{health.topic}: {error}", throttle_duration_sec=5.0)
-            return
         stamp_ns = to_nanoseconds(message.header.stamp)
         age_s = (self._node.get_clock().now().nanoseconds - stamp_ns) * 1e-9
-        health.accept(now_ns * 1e-9, age_s, (pixels.shape[1], pixels.shape[0]))
-        self._give(self._pairer.add(side, stamp_ns, ImageFrame(message.header, pixels, now_ns), now_ns))
+        if self._wanted is not None:
+            health.pass_over(now_ns * 1e-9, age_s)
+            self._give(self._pairer.add(side, stamp_ns, _Undecoded(message, now_ns), now_ns))
+            return
+        frame = self._decoded(side, message, now_ns)
+        if frame is None:
+            return
+        health.accept(now_ns * 1e-9, age_s, (frame.pixels.shape[1], frame.pixels.shape[0]))
+        self._give(self._pairer.add(side, stamp_ns, frame, now_ns))
+
+    def _decoded(self, side: int, message: Any, arrived_ns: int) -> ImageFrame | None:
+        health = self._health[side]
+        try:
+            with self.decode_times.measure("decode"):
+                return ImageFrame(message.header, self._to_pixels(message), arrived_ns)
+        except ImageError as error:
+            health.refuse(monotonic_ns() * 1e-9, str(error))
+            self._node.get_logger().warning(f"{health.topic}: {error}", throttle_duration_sec=5.0)
+            return None
+
+    def _decoded_pair(self, pair: Pair[Any]) -> ImagePair | None:
+        if self._wanted is None:
+            return pair
+        if not self._wanted(pair.left_stamp_ns):
+            return None
+        left, right = (
+            self._decoded(side, frame.message, frame.arrived_ns) for side, frame in enumerate((pair.left, pair.right))
+        )
+        if left is None or right is None:
+            return None
+        for health, frame in zip(self._health, (left, right), strict=True):
+            health.looked_into((frame.pixels.shape[1], frame.pixels.shape[0]))
+        return Pair(left, right, pair.left_stamp_ns, pair.right_stamp_ns)
 
     def _on_deadline(self) -> None:
         self._deadline.cancel()
         self._give(self._pairer.expire(monotonic_ns()))
 
-    def _give(self, pairs: list[ImagePair]) -> None:
+    def _give(self, pairs: list[Pair[Any]]) -> None:
         deadline_ns = self._pairer.deadline_ns
         if deadline_ns is not None:
             self._deadline.timer_period_ns = max(deadline_ns - monotonic_ns(), 1)
             self._deadline.reset()
-        for pair in pairs:
+        for pair in filter(None, map(self._decoded_pair, pairs)):
             left, right = pair.left.pixels.shape, pair.right.pixels.shape
             if left[:2] != right[:2]:
                 self._size_mismatch = (

@@ -31,11 +31,19 @@ class StreamHealth:
 
     def accept(self, now_s: float, age_s: float, size_px: tuple[int, int]) -> None:
         """Take a usable image of (width, height)."""
+        self.looked_into(size_px)
+        self.pass_over(now_s, age_s)
+
+    def looked_into(self, size_px: tuple[int, int]) -> None:
+        """Take note that an image was good and of (width, height)."""
+        self.size_px = size_px
+        self._refusal = None
+
+    def pass_over(self, now_s: float, age_s: float) -> None:
+        """Take an image that nobody looked into."""
         if now_s - self._last_s > 1.0:
             self._arrivals_s.clear()  # a rate over a gap says nothing
         self.received += 1
-        self.size_px = size_px
-        self._refusal = None
         self._last_s = now_s
         self._arrivals_s.append(now_s)
         self._ages_s.append(age_s)

@@ -1,0 +1,151 @@
+"""What the visual encoder reads of a simulated head: from features that are drawn, or from rendered images.
+
+The drawn ones stand in where hundreds of runs are wanted; how many they are and how far off is what bench_encoder
+measured on rendered rooms. Either way the cameras differ from their calibration by what the encoder is told to expect.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_metric.eye_rotation.encoder import EyeRotationReading as Reading
+from vergence_metric.eye_rotation.encoder import VisualEncoder
+from vergence_metric.eye_rotation.relative_rotation import RigDoubt, relative_rotation
+from vergence_metric.eye_rotation_parameters import EyeRotationNodeParameters
+from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import EyeAngles, rotation_rig_from_eye
+from vergence_rig.rig import JOINT_NAMES, Rig
+from vergence_servo.gaze.fake_head import FakeHead
+from vergence_servo.gaze.observations import EyeRotationReading
+from vergence_sim.parameters import SimParameters
+from vergence_sim.simulator import Simulator
+
+Array = npt.NDArray[np.float64]
+
+PARAMETERS = EyeRotationNodeParameters()
+MATCHES = 190
+WRONG_SHARE = 0.05
+COMMON_NOISE_PX = 0.08
+FRAME_NOISE_PX = 0.05
+READINGS_PER_REST = 3
+
+
+def miscalibrated(spec: CameraModel, random: np.random.Generator) -> CameraModel:
+    """Return a camera as a calibration might have found it, off by the deviations that the encoder reckons with."""
+    focal = 1.0 + random.normal(0.0, PARAMETERS.focal_doubt)
+    centre = random.normal(0.0, PARAMETERS.centre_doubt_px, 2)
+    distortion = spec.distortion.copy()
+    distortion[0] += random.normal(0.0, PARAMETERS.distortion_doubt)
+    k = [spec.fx_px * focal, 0, spec.cx_px + centre[0], 0, spec.fy_px * focal, spec.cy_px + centre[1], 0, 0, 1]
+    return CameraModel.from_camera_info_values(spec.width_px, spec.height_px, k, distortion.tolist())
+
+
+class RestWatch:
+    """Tells whether a head's joints have reported the same angles since it was last asked, and for how many times."""
+
+    def __init__(self) -> None:
+        self._said: Array | None = None
+        self.times = 0
+
+    def rests(self, head: FakeHead) -> bool:
+        """Take the joints as they are reported now."""
+        said = np.array([head.reported_rad[name] for name in JOINT_NAMES])
+        same = self._said is not None and bool(np.abs(said - self._said).max() <= PARAMETERS.still_rad)
+        self.times = self.times + 1 if same else 0
+        self._said = said
+        return same
+
+
+class DrawnFeatures:
+    """The encoder's readings of features of a room that are drawn about the head; one object for one run."""
+
+    def __init__(self, seed: int) -> None:
+        self._seed = seed
+        self._watch = RestWatch()
+        random = np.random.default_rng([seed, 1])
+        self._bend = random.normal(0.0, (PARAMETERS.focal_doubt, PARAMETERS.distortion_doubt), (2, 2))
+        self._centre = random.normal(0.0, PARAMETERS.centre_doubt_px, (2, 2))
+
+    def __call__(self, head: FakeHead) -> EyeRotationReading | None:
+        """Return the reading, None while the eyes move."""
+        if not self._watch.rests(head):
+            return None
+        focal_px = head.rig.left_camera.fx_px
+        said = np.array([head.reported_rad[name] for name in JOINT_NAMES])
+        # One pose has one set of features, whose errors last; a frame adds little of its own.
+        lasting = np.random.default_rng([self._seed, *(np.abs(said) * 1e6).astype(int).tolist()])
+        passing = np.random.default_rng([self._seed, round(head.time_s * 1e4) + 10**6])
+        points = self._points(head, lasting)
+        seen = np.array([np.concatenate([head.project(p, left=True), head.project(p, left=False)]) for p in points])
+        seen += lasting.normal(0.0, COMMON_NOISE_PX / focal_px, seen.shape)
+        seen += passing.normal(0.0, FRAME_NOISE_PX / focal_px, seen.shape)
+        wrong = lasting.random(MATCHES) < WRONG_SHARE
+        seen[wrong, 2:] = lasting.uniform(-0.4, 0.4, (int(wrong.sum()), 2))
+        views = []
+        for eye, view in enumerate((seen[:, :2], seen[:, 2:])):
+            focal, lens = self._bend[eye]
+            square = (view**2).sum(axis=1, keepdims=True)
+            views.append(view * (1.0 + focal + lens * square) + self._centre[eye] / focal_px)
+        doubt = RigDoubt(
+            focal=PARAMETERS.focal_doubt,
+            distortion=PARAMETERS.distortion_doubt,
+            centre_rad=PARAMETERS.centre_doubt_px / focal_px,
+        )
+        found = relative_rotation(views[0], views[1], float(said[0]), float(said[1]), doubt)
+        return EyeRotationReading(head.time_s, 0.0, found.vergence_rad, found.sigma_rad)
+
+    @staticmethod
+    def _points(head: FakeHead, random: np.random.Generator) -> list[Array]:
+        version, tilt = 0.5 * float(head.true_rad[0] + head.true_rad[1]), float(head.true_rad[2])
+        turn = rotation_rig_from_eye(version, tilt)
+        aside, up = random.uniform(-0.45, 0.45, MATCHES), random.uniform(-0.38, 0.38, MATCHES)
+        depth = random.uniform(0.6, 4.0, MATCHES)
+        return list((np.column_stack([np.ones(MATCHES), aside, up]) * depth[:, None]) @ turn.T)
+
+
+class RenderedRooms:
+    """The encoder on what a camera in a rendered room sees; the room stays, `begin` places the target of a run."""
+
+    def __init__(self, rig: Rig, parameters: SimParameters) -> None:
+        self._simulator = Simulator(parameters, rig)
+        self._encoder = VisualEncoder(PARAMETERS, rig)
+        self._models = [
+            CameraModel.from_camera_info_values(
+                spec.width_px,
+                spec.height_px,
+                [spec.fx_px, 0, spec.cx_px, 0, spec.fy_px, spec.cy_px, 0, 0, 1],
+                list(parameters.distortion),
+            )
+            for spec in (rig.left_camera, rig.right_camera)
+        ]
+        self.readings: list[Reading] = []
+        """Every reading since the start, believed or not."""
+        self.errors_rad: list[float] = []
+        """By how much each believed one was off the true vergence."""
+
+    def begin(self, point_m: Array, seed: int) -> None:
+        """Put a target somewhere for a run that begins now, with cameras that are miscalibrated anew."""
+        random = np.random.default_rng([seed, 2])
+        self._cameras = (miscalibrated(self._models[0], random), miscalibrated(self._models[1], random))
+        self._simulator.place_target("cube", point_m)
+        self._watch = RestWatch()
+
+    def __call__(self, head: FakeHead) -> EyeRotationReading | None:
+        """Return what is read of the head as it stands, None while it moves or has been read often enough."""
+        if not self._watch.rests(head) or self._watch.times > READINGS_PER_REST:
+            return None
+        self._simulator.set_head(dict(zip(JOINT_NAMES, head.true_rad.tolist(), strict=True)))
+        pair = self._simulator.capture()
+        eyes = EyeAngles(*(head.reported_rad[name] for name in JOINT_NAMES))
+        reading = self._encoder.measure(pair.left, pair.right, eyes, self._cameras)
+        self.readings.append(reading)
+        if not reading.ok or reading.rotation is None:
+            return EyeRotationReading(head.time_s, 0.0, math.nan, math.nan, usable=False, reason=reading.reason)
+        found = reading.rotation
+        self.errors_rad.append(found.vergence_rad - float(head.true_rad[1] - head.true_rad[0]))
+        return EyeRotationReading(head.time_s, 0.0, found.vergence_rad, found.sigma_rad)
+
+    def close(self) -> None:
+        """Free the renderer."""
+        self._simulator.close()
