@@ -28,4 +28,7 @@ def conflict(publishers: Mapping[str, Iterable[Commander]]) -> str:
     if len(nodes) < 2:
         return ""
     places = [f"{commander.node} on {topic}" for topic, commanders in publishers.items() for commander in commanders]
-    return f"{len(nodes)} commanders at once: {', '.join(sorted(places))}; the servos obey both in turn"
+    return (
+        f"{len(nodes)} commanders at once: {', '.join(sorted(places))}; the servos obey both in turn "
+        f"(one that was killed is listed for 10 s more)"
+    )
