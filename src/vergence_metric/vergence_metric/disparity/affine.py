@@ -28,6 +28,7 @@ _LARGEST_LEAP_PX = 8.0
 _LEAST_GAIN = 0.2
 _LEAST_VARIANCE = 1e-3  # grey levels squared
 _SHEAR_FROM_PX = 8.0
+_REACH_PX = 24  # that a warped window may reach beyond its own size
 _FLOOR_PX = 0.01  # interpolation, and what no residual shows
 _BLOCK_PX = 7
 _DRIFT_SHARE = 0.7  # what an answer moves by when its window grows, noise does not explain
@@ -58,8 +59,11 @@ def grow(
     pair: FoveaPair, horizontal_px: float, vertical_px: float, window_px: float, parameters: DisparityParameters
 ) -> Fit | None:
     """Fit in the window that decided, then in larger ones while they see the same surface; None if nothing fits."""
-    left, right = pair.full
-    blurred = tuple(Strip(cv2.GaussianBlur(s.grey, (0, 0), _BLUR_PX), s.x0, s.y0) for s in (left, right))
+    reach = radius_of(parameters.disparity_windows_px[-1]) + _REACH_PX
+    x, blurred = pair.point_px[0], []
+    for strip, middle in zip(pair.full, (x, x - horizontal_px), strict=True):
+        near = strip.columns(round(middle) - reach, round(middle) + reach + 1)
+        blurred.append(Strip(cv2.GaussianBlur(near.grey, (0, 0), _BLUR_PX), near.x0, near.y0))
     warp = np.array([[1.0, 0.0, -horizontal_px], [0.0, 1.0, -vertical_px]])
     best: Fit | None = None
     for sigma in [w for w in parameters.disparity_windows_px if w >= window_px]:
@@ -97,7 +101,7 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
     gain = 1.0
     for _ in range(_ITERATIONS):
         seen = window.seen(right, point_px, found, gain)
-        solution = window.inverse @ np.einsum("in,n->i", window.weighted, seen)
+        solution = window.inverse @ np.einsum("in,n->i", window.weighted, window.roots * seen)
         gain = float(solution[6])
         if not _LEAST_GAIN <= gain <= 1.0 / _LEAST_GAIN:
             return None
@@ -108,7 +112,7 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
         if np.abs(step).max() < _CONVERGED_PX:
             break
     residual = seen - np.einsum("i,in->n", solution, window.design)
-    variance = float((window.weights * residual**2).sum())
+    variance = float(np.square(window.roots * residual).sum())
     sigma_px = math.hypot(window.deviation(residual) / gain, _FLOOR_PX)
     return Fit(-float(found[0, 2]), -float(found[1, 2]), sigma_px, math.sqrt(variance), found[:2, :2].copy())
 
@@ -117,13 +121,14 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
 class _Window:
     """The left image about the point as a linear model: `design` (8, N) are the six affine increments, gain, offset.
 
-    `offsets` are u (1, n) and v (n, 1) from the point [px], `gradients` across and down (n, n), `weights` (N) sum to 1,
-    `weighted` is their product with the design and `inverse` (8, 8) that of the normal matrix.
+    `offsets` are u (1, n) and v (n, 1) from the point [px], `gradients` across and down (n, n), `roots` (N) those of
+    the weights, which sum to 1, `weighted` is their product with the design and `inverse` (8, 8) that of the normal
+    matrix.
     """
 
     offsets: tuple[NDArray[np.floating], NDArray[np.floating]]
     gradients: tuple[NDArray[np.floating], NDArray[np.floating]]
-    weights: Matrix
+    roots: Matrix
     design: Matrix
     weighted: Matrix
     inverse: Matrix
@@ -145,7 +150,7 @@ class _Window:
         What is left over is alike in neighbouring pixels (blur, edges, unmodelled depth): its effect is summed in
         blocks before it is squared, as in estimates consistent under autocorrelation (Newey and West, 1987).
         """
-        effect = self.weights * np.einsum("i,in->n", self.inverse[0], self.design) * residual
+        effect = self.roots * np.einsum("i,in->n", self.inverse[0], self.weighted) * residual
         effect = effect.reshape(self.gradients[0].shape)
         blocks = cv2.boxFilter(effect, -1, (_BLOCK_PX, _BLOCK_PX), normalize=False, borderType=cv2.BORDER_CONSTANT)
         return math.sqrt(float((blocks**2).sum())) / _BLOCK_PX
@@ -161,25 +166,25 @@ def _linearised(left: Strip, point_px: tuple[float, float], sigma: float) -> _Wi
     gy = 0.5 * (left.grey[y - radius + 1 : y + radius + 2, columns] - left.grey[y - radius - 1 : y + radius, columns])
     u = (np.arange(-radius, radius + 1) + (x + left.x0 - point_px[0]))[None, :]
     v = (np.arange(-radius, radius + 1) + (y + left.y0 - point_px[1]))[:, None]
-    weights = (np.exp(-0.5 * (v / sigma) ** 2) * np.exp(-0.5 * (u / sigma) ** 2)).ravel()
-    weights /= weights.sum()
-    centred = patch - float((weights * patch.ravel()).sum())
+    across, down = np.exp(-0.5 * (u / sigma) ** 2), np.exp(-0.5 * (v / sigma) ** 2)
+    roots = np.sqrt(down / down.sum()) * np.sqrt(across / across.sum())
+    centred = patch - float((roots * roots * patch).sum())
     # Offsets are scaled by the window, so that the rows of the design are of one size.
     parts = [gx, gx * (u / sigma), gx * (v / sigma), gy, gy * (u / sigma), gy * (v / sigma), centred]
     design = np.empty((8, patch.size))
     for row, part in zip(design[:7], parts, strict=True):
         row[:] = part.ravel()
     design[7] = 1.0
-    weighted = design * weights
-    # einsum, not matmul: BLAS threads wait for one another whenever other nodes hold the cores.
-    normal = np.einsum("in,jn->ij", weighted, design)
+    weighted = design * roots.ravel()
+    # OpenCV and einsum, not matmul: BLAS threads wait for one another whenever other nodes hold the cores.
+    normal = cv2.mulTransposed(weighted, False)
     if float(normal[6, 6]) < _LEAST_VARIANCE:
         return None
     try:
         inverse = np.linalg.inv(normal + np.diag(_damping(sigma)))
     except np.linalg.LinAlgError:
         return None
-    return _Window((u, v), (gx, gy), weights, design, weighted, inverse)
+    return _Window((u, v), (gx, gy), roots.ravel(), design, weighted, inverse)
 
 
 def _damping(sigma: float) -> Matrix:

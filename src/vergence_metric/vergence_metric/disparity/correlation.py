@@ -99,8 +99,10 @@ def texture_of(patch: NDArray[np.float32], sigma: float) -> Texture:
     centred = patch - float((weights * patch).sum())
     variance = float((weights * centred * centred).sum())
     # Strong texture raises Immerkaer's mean of absolute values; the median only follows what most pixels do.
-    residual = np.abs(cv2.filter2D(patch, cv2.CV_32F, _LAPLACIAN)[1:-1, 1:-1])
-    noise = min(1.4826 * float(np.median(residual)) / 6.0, _NOISE_GAIN * float(residual.mean()))
+    residual = np.abs(cv2.filter2D(patch, cv2.CV_32F, _LAPLACIAN)[1:-1, 1:-1]).ravel()
+    middle = residual.size // 2  # of an odd number: np.median without its checks, which take longer than the sorting
+    median = float(np.partition(residual, middle)[middle])
+    noise = min(1.4826 * median / 6.0, _NOISE_GAIN * float(residual.mean()))
     gx = cv2.filter2D(patch, cv2.CV_32F, _DIFFERENCE)
     gy = cv2.filter2D(patch, cv2.CV_32F, _DIFFERENCE.T)
     # White noise of deviation s adds s^2/2 to the squared central difference.
@@ -109,6 +111,16 @@ def texture_of(patch: NDArray[np.float32], sigma: float) -> Texture:
     signal = max(variance - noise**2, floor)
     lengths = [min(max(math.sqrt(signal / g), 1.0), 2.0 * sigma) for g in along]
     return Texture(math.sqrt(variance), noise, 4.0 * sigma**2 / (lengths[0] * lengths[1]), lengths[0])
+
+
+def texture_about(source: Strip, at: tuple[int, int], sigma: float) -> Texture:
+    """Measure the texture of the window about a point (x, y) at the strip's resolution."""
+    return texture_of(_patch(source, at, radius_of(sigma)), sigma)
+
+
+def _patch(source: Strip, at: tuple[int, int], radius: int) -> NDArray[np.float32]:
+    x, y = at[0] - int(source.x0), at[1] - int(source.y0)
+    return source.grey[y - radius : y + radius + 1, x - radius : x + radius + 1]
 
 
 def correlate(
@@ -137,8 +149,7 @@ def correlate(
     """
     radius = radius_of(sigma)
     line, weights = _window(sigma)
-    x, y = at[0] - int(source.x0), at[1] - int(source.y0)
-    patch = source.grey[y - radius : y + radius + 1, x - radius : x + radius + 1]
+    patch = _patch(source, at, radius)
     texture = texture_of(patch, sigma)
     kernel = weights * (patch - float((weights * patch).sum()))
 

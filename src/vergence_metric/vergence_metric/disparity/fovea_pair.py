@@ -31,6 +31,11 @@ class Strip:
     x0: float
     y0: float
 
+    def columns(self, first: int, end: int) -> "Strip":
+        """Return the part from the image's column `first` to `end`, half open, as far as there is one."""
+        start = max(first - int(self.x0), 0)
+        return Strip(self.grey[:, start : max(end - int(self.x0), start)], self.x0 + start, self.y0)
+
 
 @dataclass(frozen=True)
 class FoveaPair:

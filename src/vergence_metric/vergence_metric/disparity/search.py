@@ -8,12 +8,13 @@ way, from right to left.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.disparity.correlation import Surface, correlate, radius_of
+from vergence_metric.disparity.correlation import Surface, correlate, radius_of, texture_about
 from vergence_metric.disparity.evidence import Evidence
 from vergence_metric.disparity.fovea_pair import FoveaPair, Strip
 from vergence_metric.disparity.protocol import DisparityStatus, Image
@@ -88,9 +89,13 @@ class _Search:
     def __init__(self, pair: FoveaPair, parameters: DisparityParameters) -> None:
         self._pair, self._parameters = pair, parameters
 
-    def _layer(self, window_px: float, middle_px: float, half_px: int, scale: int) -> _Layer:
+    def _at(self, scale: int) -> tuple[Strip, Strip, tuple[int, int]]:
+        """Return both strips at a scale and where the point is there."""
         left, right = self._pair.full if scale == 1 else self._pair.half
-        at = (round(self._pair.point_px[0] / scale), round(self._pair.point_px[1] / scale))
+        return left, right, (round(self._pair.point_px[0] / scale), round(self._pair.point_px[1] / scale))
+
+    def _layer(self, window_px: float, middle_px: float, half_px: int, scale: int) -> _Layer:
+        left, right, at = self._at(scale)
         middle, half = round(middle_px / scale), half_px // scale
         vertical = -(-self._parameters.disparity_max_vertical_px // scale)
         surface = correlate(left, right, at, window_px / scale, (middle - half, middle + half), (-vertical, vertical))
@@ -101,16 +106,16 @@ class _Search:
 
     def _wide_layer(self, window_px: float) -> _Layer:
         reach = self._parameters.disparity_max_px
-        return self._layer(window_px, 0, reach, 1 if window_px < _HALVED_FROM_PX else 2)
+        return self._layer(window_px, 0, reach, _wide_scale(window_px))
 
     def near(self, middle_px: float, half_px: int) -> Match:
         """Search about a disparity at full resolution."""
         # Beyond the range the crops end; a fit at the end of the range is said to be OUT_OF_RANGE.
-        return self._decide([self._layer(w, middle_px, half_px, 1) for w in self._parameters.disparity_windows_px])
+        return self._decide(lambda window_px: self._layer(window_px, middle_px, half_px, 1), lambda _: 1)
 
     def wide(self) -> Match:
         """Search the whole range, then the vicinity of what a large window found."""
-        match = self._decide([self._wide_layer(w) for w in self._parameters.disparity_windows_px])
+        match = self._decide(self._wide_layer, _wide_scale)
         if not match.sure or match.window_px <= self._parameters.disparity_windows_px[0]:
             return match
         vicinity = self.near(match.horizontal_px, _VICINITY_PX)
@@ -145,17 +150,20 @@ class _Search:
             near, evidence=evidence, status=DisparityStatus.AMBIGUOUS, reason="another disparity fits as well"
         )
 
-    def _decide(self, layers: list[_Layer]) -> Match:
-        """Let each window choose among what the smaller ones left over."""
-        texture = self._parameters.disparity_minimum_texture
-        if layers[-1].surface.texture.signal < texture:
-            return _nothing(DisparityStatus.NO_TEXTURE, "too little structure at the point", layers[-1].window_px)
-        if not layers[0].visible.any():
-            reason = "every match would lie outside the right image"
-            return _nothing(DisparityStatus.OUT_OF_RANGE, reason, layers[0].window_px)
+    def _decide(self, layer_of: Callable[[float], _Layer], scale_of: Callable[[float], int]) -> Match:
+        """Let each window choose among what the smaller ones left over; none is looked at that is not needed."""
+        texture, windows = self._parameters.disparity_minimum_texture, self._parameters.disparity_windows_px
+        scale = scale_of(windows[-1])
+        left, _, at = self._at(scale)
+        if texture_about(left, at, windows[-1] / scale).signal < texture:
+            return _nothing(DisparityStatus.NO_TEXTURE, "too little structure at the point", windows[-1])
         candidates: list[int] | None = None
         best: Match | None = None
-        for layer in layers:
+        for window_px in windows:
+            layer = layer_of(window_px)
+            if window_px == windows[0] and not layer.visible.any():
+                reason = "every match would lie outside the right image"
+                return _nothing(DisparityStatus.OUT_OF_RANGE, reason, window_px)
             if layer.surface.texture.signal < texture:
                 continue
             columns = self._candidates(layer, candidates)
@@ -213,9 +221,9 @@ class _Search:
     def _left_right_error(self, layer: _Layer, i: int, j: int) -> float:
         """Match back from the right image; return how far from the point it ends, in full-resolution pixels."""
         scale, surface, sigma = layer.scale, layer.surface, layer.window_px / layer.scale
-        left, right = self._pair.full if scale == 1 else self._pair.half
+        left, right, point = self._at(scale)
         d, v = surface.first_d + i, surface.first_v + j
-        at = (round(self._pair.point_px[0] / scale) - d, round(self._pair.point_px[1] / scale) - v)
+        at = (point[0] - d, point[1] - v)
         back = _reverse_range(at, d, left, right, sigma, _REVERSE_PX // scale)
         if back is None:
             return math.inf
@@ -224,6 +232,10 @@ class _Search:
         there, again = surface.subpixel(i, j), reverse.subpixel(k, int(reverse.zncc[:, k].argmax()))
         # Between the peaks proper: at half resolution an odd disparity lies half way between two columns.
         return abs(again[0] - there[0]) * float(scale)
+
+
+def _wide_scale(window_px: float) -> int:
+    return 1 if window_px < _HALVED_FROM_PX else 2
 
 
 def _peaks(profile: NDArray[np.float32]) -> NDArray[np.intp]:
