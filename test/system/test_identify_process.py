@@ -162,6 +162,8 @@ def test_ctrl_c_brings_the_eyes_back_and_writes_nothing(
     assert process.stdout is not None
     lines = iter(process.stdout.readline, "")
     assert any(line.startswith("pan_left:") for line in lines)
+    while max(abs(angle) for angle in reported(domain_id).values()) < math.radians(3):
+        assert process.poll() is None
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 1
