@@ -137,3 +137,16 @@ def test_real_pairs_give_the_offset_of_their_board_corners(number: int) -> None:
     assert all(found for found, _ in corners)
     offset = corners[0][1].reshape(-1, 2)[:, 1] - corners[1][1].reshape(-1, 2)[:, 1]
     assert auto().update(left, right).vertical_px == pytest.approx(float(offset.mean()), abs=1.5)
+
+
+def test_later_estimates_wait_until_there_is_time() -> None:
+    aligner = auto(align_every_pairs=1)
+    for seed in range(5):
+        before = aligner.update(*pair(3.0, 0.0, seed=seed))
+    assert aligner.update(*pair(3.8, 0.0)) == before, "the pair's own figures do not wait for it"
+    aligner.settle()
+    settled = aligner.update(*pair(3.8, 0.0))
+    assert settled.vertical_px > before.vertical_px + 0.05
+    aligner.settle()
+    aligner.settle()  # nothing is left to be done
+    assert aligner.update(*pair(3.8, 0.0)).vertical_px > settled.vertical_px + 0.01

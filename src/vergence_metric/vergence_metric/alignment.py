@@ -70,7 +70,8 @@ class Aligner:
 
     Auto estimates offset and roll from every one of the first few pairs, then from one in `align_every_pairs`, and
     filters each with a scalar Kalman filter. An estimate far from what is known is left out, unless several in a row
-    are.
+    are. The first few count for their own pair; the later ones take as long as the rest of a pair's work, so that they
+    are put off: to `settle`, for which there is time once the pair's figures are out, or to the next pair.
     """
 
     def __init__(self, parameters: EdgeMetricParameters) -> None:
@@ -79,6 +80,7 @@ class Aligner:
         self._rejected = 0
         self._estimated = False
         self._vertical, self._roll = _ignorance()
+        self._due: tuple[Grey, Grey] | None = None
 
     def update(self, left: Grey, right: Grey) -> Alignment:
         """Return the alignment of this pair of (h, w) uint8 images, given all that came before it."""
@@ -87,21 +89,34 @@ class Aligner:
             return Alignment("none")
         if p.align == "calibrated":
             return Alignment("calibrated", p.align_vertical_px, math.radians(p.align_roll_deg))
-        if self._pairs < _EAGER_PAIRS or self._pairs % p.align_every_pairs == 0:
-            seen = estimate_misalignment(
-                left,
-                right,
-                search_horizontal_px=p.align_search_px,
-                search_vertical_px=math.ceil(p.align_max_vertical_px * 1.5),
-            )
-            if seen is not None:
-                self._take(seen)
+        self.settle()
+        if self._pairs < _EAGER_PAIRS:
+            self._estimate(left, right)
+        elif self._pairs % p.align_every_pairs == 0:
+            self._due = left, right
         self._pairs += 1
         most_px, most_rad = p.align_max_vertical_px, math.radians(p.align_max_roll_deg)
         vertical = min(max(self._vertical.value, -most_px), most_px)
         roll = min(max(self._roll.value, -most_rad), most_rad)
         bounded = vertical != self._vertical.value or roll != self._roll.value
         return Alignment("auto", vertical, roll, bounded, self._estimated)
+
+    def settle(self) -> None:
+        """Make the estimate that was put off, if any."""
+        if self._due is not None:
+            due, self._due = self._due, None
+            self._estimate(*due)
+
+    def _estimate(self, left: Grey, right: Grey) -> None:
+        p = self._parameters
+        seen = estimate_misalignment(
+            left,
+            right,
+            search_horizontal_px=p.align_search_px,
+            search_vertical_px=math.ceil(p.align_max_vertical_px * 1.5),
+        )
+        if seen is not None:
+            self._take(seen)
 
     def _take(self, seen: Misalignment) -> None:
         surprising = self._vertical.surprising(seen.vertical_px, seen.vertical_sigma_px)

@@ -97,6 +97,10 @@ class EdgeMetric:
             right_grey = alignment.apply(right_grey)
         return AlignedPair(left_grey, right_grey, alignment, stage_s)
 
+    def settle(self) -> None:
+        """Do what was put off until a pair's figures are out; left undone, the next pair does it."""
+        self._aligner.settle()
+
     def measure_aligned(self, pair: AlignedPair) -> EdgeMetricResult:
         """Measure a pair that `align` has made ready."""
         p, stage_s = self.parameters, dict(pair.stage_s)

@@ -87,6 +87,7 @@ class EdgeMetricNode(Node):
             with self._times.measure("overlay"):
                 picture = draw_overlay(pair.left.pixels, edge, disparity)
                 self._overlay_publisher.publish(array_to_image(picture, header))
+        self._measurement.settle()
         self._failure = None
 
     def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, models: Models | None) -> None:

@@ -57,6 +57,10 @@ class PairMeasurement:
         """Return metric I of a pair of images of one size; raises ImageShapeError for others."""
         return self._metric.measure(left, right)
 
+    def settle(self) -> None:
+        """Do what was put off until the pair's figures are out."""
+        self._metric.settle()
+
     def disparity(self, edge: EdgeMetricResult) -> Disparity:
         """Return the signed disparity at the left image's centre of a pair measured by `edge`."""
         return self._estimator.estimate(edge.left_grey, edge.right_grey)
