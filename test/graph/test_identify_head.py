@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,9 @@ from vergence_servo.gaze_controller_node import GazeControllerNode
 from vergence_servo.identifying import identified_head_node
 from vergence_servo.identifying.axis_log import EYES, IdentifyError, Move
 from vergence_servo.identifying.identified_head_node import IdentifiedHead
+from vergence_servo.identifying.identified_rig import nodes_text
 from vergence_servo.running_head_node import HeadError
+from vergence_servo.servo_node import ServoNode
 
 pytestmark = pytest.mark.graph
 
@@ -220,3 +223,26 @@ def test_eyes_that_close_in_the_middle_are_refused(start: Start, monkeypatch: py
             head.record("tilt", [Move(0.02, 0.2, 0.0)])
     assert node.position["tilt"] == pytest.approx(0.05)
     assert set(node.position) == set(JOINT_NAMES)
+
+
+def test_the_nodes_own_file_reaches_them(domain_id: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    path = tmp_path / "rig.nodes.yaml"
+    values = {"/left/camera_node": {"stamp_offset_s": 0.012}, "/servo_node": {"command_latency_s": 0.04}}
+    path.write_text(nodes_text({name: {"ros__parameters": own} for name, own in values.items()}))
+    context = Context()
+    rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)
+    servos = ServoNode(context=context)
+    assert servos.get_parameter("command_latency_s").value == 0.04
+    camera = Node(
+        "camera_node", namespace="left", context=context, automatically_declare_parameters_from_overrides=True
+    )
+    assert camera.get_parameter("stamp_offset_s").value == 0.012
+    other = Node(
+        "camera_node", namespace="right", context=context, automatically_declare_parameters_from_overrides=True
+    )
+    assert not other.has_parameter("stamp_offset_s")
+    servos.close()
+    for node in (servos, camera, other):
+        node.destroy_node()
+    context.try_shutdown()

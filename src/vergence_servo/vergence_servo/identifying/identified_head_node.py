@@ -28,6 +28,7 @@ TRANSPORTS = ("auto", "raw", "compressed")
 _DISCOVERY_S = 20.0
 _PATIENCE_S = 20.0
 _LISTEN_S = 0.6
+_START_S = 1.0
 _FRAMES_AT_REST = 3
 _AHEAD_S, _OLD_S = 0.2, 5.0
 _RETURN_S = 3.0
@@ -83,6 +84,8 @@ class IdentifiedHead(RunningHead):
         self._check_alone()
         with self.arrival:
             self._before = dict(self._present)
+        # released servos start one after the other, and jump to where they are believed to be
+        self._rest(self.tell(self._before), _START_S)
         return [controller.name for controller in self._controllers.silenced]
 
     def cameras(self) -> dict[str, EyeCamera]:
