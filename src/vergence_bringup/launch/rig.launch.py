@@ -1,24 +1,31 @@
 """A real head on one machine: two cameras, the metrics, the controller and the servos.
 
 ros2 launch vergence_bringup rig.launch.py left_device:=/dev/v4l/by-id/... right_device:=/dev/v4l/by-id/...
-With the servos on another machine use laptop.launch.py there and pi.launch.py here, or servos:=false.
+With the servos on another machine use laptop.launch.py there and pi.launch.py here, or servos:=false. detector:=true
+model:=/path/to/your.onnx adds metric II.
 """
 
 from pathlib import Path
+from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, GroupAction, SetEnvironmentVariable
 from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration
+from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node, PushRosNamespace
+from launch_ros.parameter_descriptions import ParameterValue
 
 
 def generate_launch_description() -> LaunchDescription:
     config = Path(get_package_share_directory("vergence_bringup")) / "config"
     rig = LaunchConfiguration("rig")
 
-    def camera(eye: str) -> Node:
+    def text(value: Any) -> ParameterValue:
+        # Else launch takes 0 for a number and off for false.
+        return ParameterValue(value, value_type=str)
+
+    def camera(eye: str, lock: str, partner: Any = "") -> Node:
         # camera_node publishes image_raw and camera_info relative to its namespace: left/... and right/...
         return Node(
             package="vergence_camera",
@@ -30,19 +37,26 @@ def generate_launch_description() -> LaunchDescription:
                 str(config / "camera_node.yaml"),
                 {
                     "rig": rig,
-                    "device": LaunchConfiguration(f"{eye}_device"),
-                    "camera_info_url": LaunchConfiguration(f"{eye}_camera_info_url"),
+                    "device": text(LaunchConfiguration(f"{eye}_device")),
+                    "camera_info_url": text(LaunchConfiguration(f"{eye}_camera_info_url")),
                     "frame_id": f"{eye}_camera_optical_frame",
+                    # One exposure and white balance for both eyes: see docs/cameras.md.
+                    "lock": text(
+                        PythonExpression([f"'{lock}' if '", LaunchConfiguration("lock"), "' == 'true' else 'off'"])
+                    ),
+                    "partner": text(partner),
                 },
             ],
         )
 
-    def node(package: str, executable: str, condition: str | None = None) -> Node:
+    left_camera = PythonExpression(["'/' + '", LaunchConfiguration("namespace"), "/left/camera_node'.strip('/')"])
+
+    def node(package: str, executable: str, condition: str | None = None, **parameters: object) -> Node:
         return Node(
             package=package,
             executable=executable,
             output="screen",
-            parameters=[str(config / f"{executable}.yaml"), {"rig": rig}],
+            parameters=[str(config / f"{executable}.yaml"), {"rig": rig, **parameters}],
             condition=IfCondition(LaunchConfiguration(condition)) if condition else None,
         )
 
@@ -55,7 +69,13 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument("namespace", default_value="", description="namespace of the whole head"),
             DeclareLaunchArgument("rig", default_value=str(config / "rig.yaml"), description="the rig's description"),
             DeclareLaunchArgument("servos", default_value="true", description="run servo_node on this machine"),
-            DeclareLaunchArgument("boxes", default_value="false", description="run box_metric_node, the detector"),
+            DeclareLaunchArgument("detector", default_value="false", description="run box_metric_node"),
+            DeclareLaunchArgument(
+                "model", default_value="", description="its ONNX file; empty is the one of the simulator's cube"
+            ),
+            DeclareLaunchArgument(
+                "lock", default_value="true", description="one fixed exposure and white balance for both cameras"
+            ),
             DeclareLaunchArgument(
                 "encoder", default_value="true", description="run eye_rotation_node, the visual encoder"
             ),
@@ -64,10 +84,10 @@ def generate_launch_description() -> LaunchDescription:
             GroupAction(
                 [
                     PushRosNamespace(LaunchConfiguration("namespace")),
-                    camera("left"),
-                    camera("right"),
+                    camera("left", "hold"),
+                    camera("right", "follow", left_camera),
                     node("vergence_metric", "edge_metric_node"),
-                    node("vergence_metric", "box_metric_node", "boxes"),
+                    node("vergence_metric", "box_metric_node", "detector", model=text(LaunchConfiguration("model"))),
                     node("vergence_metric", "eye_rotation_node", "encoder"),
                     node("vergence_servo", "gaze_controller_node"),
                     node("vergence_servo", "servo_node", "servos"),

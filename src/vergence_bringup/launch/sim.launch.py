@@ -1,6 +1,6 @@
-"""The whole graph on the simulated head: sim_node, edge_metric_node, eye_rotation_node, gaze_controller_node.
+"""The whole graph on the simulated head: sim_node, the metric nodes, gaze_controller_node.
 
-ros2 launch vergence_bringup sim.launch.py [preset:=ideal] [encoder:=false] [namespace:=head]
+ros2 launch vergence_bringup sim.launch.py [preset:=ideal] [detector:=false] [encoder:=false] [namespace:=head]
 """
 
 from pathlib import Path
@@ -34,6 +34,9 @@ def generate_launch_description() -> LaunchDescription:
                 "preset", default_value="realistic", description="realistic or ideal cameras and servos"
             ),
             DeclareLaunchArgument(
+                "detector", default_value="true", description="run box_metric_node, which knows the simulator's cube"
+            ),
+            DeclareLaunchArgument(
                 "encoder", default_value="true", description="run eye_rotation_node, the visual encoder"
             ),
             DeclareLaunchArgument("fastdds_profile", default_value=str(config / "fastdds.xml")),
@@ -43,6 +46,7 @@ def generate_launch_description() -> LaunchDescription:
                     PushRosNamespace(LaunchConfiguration("namespace")),
                     node("vergence_sim", "sim_node", preset=LaunchConfiguration("preset")),
                     node("vergence_metric", "edge_metric_node"),
+                    node("vergence_metric", "box_metric_node", "detector"),
                     node("vergence_metric", "eye_rotation_node", "encoder"),
                     node("vergence_servo", "gaze_controller_node"),
                 ]

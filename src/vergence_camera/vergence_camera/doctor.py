@@ -46,7 +46,7 @@ def check(
     tree: SystemTree | None = None,
     trial_s: float = 1.5,
     patience_s: float = 3.0,
-    max_skew_s: float = 0.017,
+    max_skew_s: float = 0.02,
 ) -> list[Finding]:
     """Look at every camera, let all of them stream together for `trial_s`, and compare each two.
 

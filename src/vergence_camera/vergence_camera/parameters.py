@@ -67,7 +67,7 @@ class CameraParameters(Parameters):
     )
     partner: str = parameter("", "full name of the other eye's camera node; empty compares nothing", read_only=True)
     max_skew_s: float = parameter(
-        0.017, "pairs further apart are reported: what the pairer accepts", unit="s", minimum=0.0, maximum=1.0
+        0.02, "pairs further apart are reported: what the pairer accepts", unit="s", minimum=0.0, maximum=1.0
     )
 
     def check(self) -> None:
