@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import json
+import signal
 
 import pytest
 
@@ -83,16 +84,24 @@ def test_a_graph_that_never_gets_ready_fails_them_all(error):
     assert [result.reason for result in results] == [f"not visited: {error}"] * 3
 
 
+@pytest.fixture
+def own_signals():
+    """Give the signal handlers back that the command sets."""
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.usefixtures("own_signals")
 @pytest.mark.parametrize(("failures", "status"), [({}, 0), ({THREE[0].name: GraphError("no answer")}, 1)])
 def test_the_command_writes_summary_and_report_either_way(failures, status, monkeypatch, tmp_path, capsys):
     @contextlib.contextmanager
     def scripted(*_):
         yield ScriptedRunner(failures)
 
-    # What the command does to its own process is not for the tests' process.
+    # The command sets its process's environment, which here is the tests' process.
     monkeypatch.setenv("ROS_DOMAIN_ID", "0")
     monkeypatch.setattr(demo, "environment", dict)
-    monkeypatch.setattr(demo.signal, "signal", lambda *_: None)
     monkeypatch.setattr(demo, "_runner", scripted)
     monkeypatch.setattr(demo, "_commands", lambda options: {})
     assert main(["demo", "--short", "--out", str(tmp_path)]) == status
