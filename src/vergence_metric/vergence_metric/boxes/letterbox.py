@@ -71,10 +71,11 @@ class Letterbox:
 
 def blob(picture: NDArray[np.uint8], color: str, unit_scale: bool, dtype: type[np.floating[Any]]) -> NDArray[Any]:
     """Return the input tensor (1, 3, h, w) of a BGR picture (h, w, 3): `color` rgb or bgr, 0..1 or 0..255."""
-    planes = picture.transpose(2, 0, 1)
-    if color == "rgb":
-        planes = planes[::-1]
-    tensor = planes.astype(dtype)
-    if unit_scale:
-        tensor *= dtype(1.0 / 255.0)
-    return np.ascontiguousarray(tensor)[None]
+    tensor = np.empty((1, 3, *picture.shape[:2]), dtype)
+    # Plane by plane: converting the interleaved picture as a whole takes five times as long.
+    for plane, channel in zip(tensor[0][:: -1 if color == "rgb" else 1], cv2.split(picture), strict=True):
+        if unit_scale:
+            np.multiply(channel, dtype(1.0 / 255.0), out=plane)
+        else:
+            plane[:] = channel
+    return tensor
