@@ -99,9 +99,9 @@ class CameraNode(Node):
     def _deliver(self, frame: Frame, stamp: Stamp) -> None:
         """Publish one frame, in the capture thread; each form only if someone listens to it."""
         began_ns = time.monotonic_ns()
-        if began_ns >= self._look_again_ns:
-            self._look_around(began_ns)
         try:
+            if began_ns >= self._look_again_ns:
+                self._look_around(began_ns)
             if self._wanted[0]:
                 self._compressed.publish(self._serialise(self._jpeg(frame), stamp.ros_ns))
             if self._wanted[1]:
