@@ -231,7 +231,8 @@ def test_the_nodes_own_file_reaches_them(domain_id: int, tmp_path: Path, monkeyp
     values = {"/left/camera_node": {"stamp_offset_s": 0.012}, "/servo_node": {"command_latency_s": 0.04}}
     path.write_text(nodes_text({name: {"ros__parameters": own} for name, own in values.items()}))
     context = Context()
-    rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)
+    shipped = Path(__file__).parents[2] / "config" / "servo_node.yaml"
+    rclpy.init(args=["--ros-args", "--params-file", str(shipped), "--params-file", str(path)], context=context)
     servos = ServoNode(context=context)
     assert servos.get_parameter("command_latency_s").value == 0.04
     camera = Node(

@@ -25,6 +25,11 @@ def generate_launch_description() -> LaunchDescription:
         # Else launch takes 0 for a number and off for false.
         return ParameterValue(value, value_type=str)
 
+    def settings(executable: str) -> list[Any]:
+        # the second file is what vergence identify found; without one the first again, which changes nothing
+        shipped = str(config / f"{executable}.yaml")
+        return [shipped, PythonExpression(["'", LaunchConfiguration("identified"), f"' or '{shipped}'"])]
+
     def camera(eye: str, lock: str, partner: Any = "") -> Node:
         # camera_node publishes image_raw and camera_info relative to its namespace: left/... and right/...
         return Node(
@@ -34,7 +39,7 @@ def generate_launch_description() -> LaunchDescription:
             namespace=eye,
             output="screen",
             parameters=[
-                str(config / "camera_node.yaml"),
+                *settings("camera_node"),
                 {
                     "rig": rig,
                     "device": text(LaunchConfiguration(f"{eye}_device")),
@@ -56,7 +61,7 @@ def generate_launch_description() -> LaunchDescription:
             package=package,
             executable=executable,
             output="screen",
-            parameters=[str(config / f"{executable}.yaml"), {"rig": rig, **parameters}],
+            parameters=[*settings(executable), {"rig": rig, **parameters}],
             condition=IfCondition(LaunchConfiguration(condition)) if condition else None,
         )
 
@@ -68,6 +73,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument("right_camera_info_url", default_value=""),
             DeclareLaunchArgument("namespace", default_value="", description="namespace of the whole head"),
             DeclareLaunchArgument("rig", default_value=str(config / "rig.yaml"), description="the rig's description"),
+            DeclareLaunchArgument("identified", default_value="", description="rig.nodes.yaml of vergence identify"),
             DeclareLaunchArgument("servos", default_value="true", description="run servo_node on this machine"),
             DeclareLaunchArgument("detector", default_value="false", description="run box_metric_node"),
             DeclareLaunchArgument(
