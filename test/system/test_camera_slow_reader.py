@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,14 +17,15 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.task import Future
 
 from vergence_bringup.processes import NodeCommand
+from vergence_common.stamps import to_nanoseconds
 
 pytestmark = pytest.mark.system
 
 PATIENCE_S = 90.0
 RATE_HZ, STILL_FRAMES = 30.0, 60
+LONG_NS = 0.5 * STILL_FRAMES / RATE_HZ * 1e9
 # Prints the stamp [ns] of every frame.
 READER = """
 import rclpy
@@ -73,22 +75,22 @@ class Watcher:
         self._node = Node("watcher", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._values: dict[str, str] = {}
+        self._heard: list[tuple[int, dict[str, str]]] = []
         self._node.create_subscription(DiagnosticArray, "/diagnostics", self._take, 10)
 
     def _take(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name == "left/camera_node: camera":
-                self._values = {entry.key: entry.value for entry in status.values}
-                self._arrived.set_result(None)
+                values = {entry.key: entry.value for entry in status.values}
+                self._heard.append((to_nanoseconds(message.header.stamp), values))
 
-    def wait_for_frames(self, count: int) -> dict[str, str]:
-        """Return the figures once the camera has published `count` frames."""
-        while int(self._values.get("frames", 0)) < count:
-            self._arrived = Future(executor=self._executor)
-            self._executor.spin_until_future_complete(self._arrived, timeout_sec=PATIENCE_S)
-            assert self._arrived.done(), "the camera says nothing"
-        return self._values
+    def values(self, after_ns: int, frames: int = 0) -> dict[str, str]:
+        """Return the figures of a time [ns] after `after_ns` when at least so many frames had been published."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not self._heard or self._heard[-1][0] <= after_ns or int(self._heard[-1][1]["frames"]) < frames:
+            assert time.monotonic() < end_s, "the camera says nothing"
+            self._executor.spin_once(timeout_sec=0.1)
+        return self._heard[-1][1]
 
     def close(self) -> None:
         self._executor.shutdown()
@@ -109,13 +111,11 @@ def test_a_reader_that_stands_still_costs_only_its_own_frames(watcher: Watcher, 
         assert reader.stdout is not None
         int(reader.stdout.readline())
         os.kill(reader.pid, signal.SIGSTOP)
-        before = int(watcher.wait_for_frames(1)["frames"])
-        while_still = watcher.wait_for_frames(before + STILL_FRAMES)
+        before = int(watcher.values(time.time_ns())["frames"])
+        while_still = watcher.values(0, before + STILL_FRAMES)
         os.kill(reader.pid, signal.SIGCONT)
         stamps_ns = [int(reader.stdout.readline())]
-        while (
-            len(stamps_ns) < before + 3 * STILL_FRAMES and np.ptp(stamps_ns[-2:]) < 0.5 * STILL_FRAMES / RATE_HZ * 1e9
-        ):
+        while len(stamps_ns) < before + 3 * STILL_FRAMES and np.ptp(stamps_ns[-2:]) < LONG_NS:
             stamps_ns.append(int(reader.stdout.readline()))
     assert while_still["reconnects"] == "0"
-    assert np.diff(stamps_ns).max() > 0.5 * STILL_FRAMES / RATE_HZ * 1e9, "it was given what it had missed"
+    assert np.diff(stamps_ns).max() > LONG_NS, "it was given what it had missed"
