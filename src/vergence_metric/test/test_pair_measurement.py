@@ -7,7 +7,7 @@ import pytest
 from vergence_metric.edge_metric import EdgeMetricResult
 from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
 from vergence_metric.pair_measurement import PairMeasurement
-from vergence_metric.tracker import Track, TrackStatus
+from vergence_metric.track import Track, TrackStatus
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import default_rig
 

@@ -9,7 +9,7 @@ from vergence_common.stamps import to_stamp
 from vergence_metric.disparity import Disparity
 from vergence_metric.edge_metric import EdgeMetricResult
 from vergence_metric.eye_rotation.encoder import EyeRotationReading
-from vergence_metric.tracker import Track
+from vergence_metric.track import Track
 from vergence_metric.viewing_angles import AngularDisparity
 from vergence_msgs.msg import EdgeVergence, EyeRotation, TargetTrack, VergenceError
 

@@ -1,6 +1,5 @@
 """All that is measured on a pair of images, stage by stage, so that each can be published as soon as it is known."""
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +10,8 @@ from vergence_metric.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
 from vergence_metric.edge_parameters import EdgeMetricParameters
 from vergence_metric.fovea_parameters import DisparityParameters, TrackerParameters
-from vergence_metric.tracker import TargetTracker, Track, TrackStatus
+from vergence_metric.track import Track, TrackStatus
+from vergence_metric.tracker import TargetTracker
 from vergence_metric.verged import VergedJudge
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
@@ -92,10 +92,7 @@ class PairMeasurement:
         return replace(track, track_id=self._newest_id)
 
     def _nothing(self, reason: str) -> Track:
-        nan = math.nan
-        return Track(
-            self._newest_id, nan, (nan, nan), (nan, nan), nan, nan, nan, (nan, nan), 0.0, TrackStatus.UNLOCKED, reason
-        )
+        return Track.nowhere(self._newest_id, TrackStatus.UNLOCKED, reason)
 
 
 def _differ(kind: type[Parameters], one: Parameters, other: Parameters) -> bool:

@@ -9,8 +9,7 @@ about the direction it is predicted in until it shows again.
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
-from enum import IntEnum
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,50 +18,17 @@ from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, Di
 from vergence_metric.eye_watch import EyeState, EyeView, EyeWatch, Pixel
 from vergence_metric.fovea_parameters import TrackerParameters
 from vergence_metric.image_motion import image_motion_px
+from vergence_metric.track import NOWHERE, Track, TrackStatus
+from vergence_metric.tracked_target import Target
 from vergence_metric.zero_disparity import ZeroDisparity, zero_disparity
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 
-_NOWHERE: Pixel = (math.nan, math.nan)
-_MOTION_MEMORY = 0.6  # share of the old angular velocity kept at each frame
-_COAST_HALF_LIFE_S = 0.7  # a hidden target's predicted velocity fades: it may have stopped
 _USUAL_EXTENT_PX = (60.0, 60.0)
 _UNMISTAKABLE_LIKENESS = 0.8
 _KEPT_SHARE = 0.9  # of a saccade: nearer to the fovea than this the target was not left
 _DISTRUST_WITHOUT_DISPARITY = 0.6
 _USUAL_DEPTH_M = 0.06
-
-
-class TrackStatus(IntEnum):
-    """The numbers are those of TargetTrack.msg."""
-
-    OK = 0
-    LOCKING = 1
-    LOST = 2
-    OCCLUDED = 3
-    UNLOCKED = 4
-
-
-@dataclass(frozen=True)
-class Track:
-    """Where the target is; the fields are those of TargetTrack.msg, NaN where unknown.
-
-    `left_px`, `right_px` (x, y) in the images given, `disparity_px` = x_left - x_right, `extent_px` (width, height) of
-    the region locked on at its present scale. `confidence` is the likeness of the target to itself, lowered where its
-    disparity could not be confirmed.
-    """
-
-    track_id: int
-    lock_stamp_s: float
-    left_px: Pixel
-    right_px: Pixel
-    disparity_px: float
-    vertical_px: float
-    sigma_px: float
-    extent_px: tuple[float, float]
-    confidence: float
-    status: TrackStatus
-    reason: str
 
 
 class TargetTracker:
@@ -86,7 +52,7 @@ class TargetTracker:
     def reset(self) -> None:
         """Forget the target and the eyes' motion; the next lock has a new id."""
         self._watch = EyeWatch(self._parameters)
-        self._target: _Target | None = None
+        self._target: Target | None = None
         self._wants_lock = True
         self._stamp_s = self._lost_s = -math.inf
         self._before: Image | None = None
@@ -156,8 +122,7 @@ class TargetTracker:
         return state.rested_s >= p.track_still_wait_s or image_motion_px(before, left) <= p.track_still_px
 
     def _without(self, status: TrackStatus, reason: str) -> Track:
-        nan = math.nan
-        return Track(self._track_id, nan, _NOWHERE, _NOWHERE, nan, nan, nan, (nan, nan), 0.0, status, reason)
+        return Track.nowhere(self._track_id, status, reason)
 
     def _lock(self, left: Image, right: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Track:
         """Lock on what lies at the fovea."""
@@ -171,7 +136,7 @@ class TargetTracker:
         self._distances.clear()
         looks = Appearance(left, point, extent or _USUAL_EXTENT_PX)
         direction = views[0].direction(point)
-        self._target = _Target(self._track_id, stamp_s, looks, stamp_s, direction, np.zeros(3), extent is not None)
+        self._target = Target(self._track_id, stamp_s, looks, stamp_s, direction, np.zeros(3), extent is not None)
         return self._tell(self._target, Sighting(point, 1.0, 0), disparity, views)
 
     def _segment(
@@ -203,7 +168,7 @@ class TargetTracker:
         )
 
     def _follow(
-        self, target: "_Target", left: Image, right: Image, stamp_s: float, views: tuple[EyeView, EyeView]
+        self, target: Target, left: Image, right: Image, stamp_s: float, views: tuple[EyeView, EyeView]
     ) -> Track:
         """Find the target again in the next pair."""
         p = self._parameters
@@ -245,12 +210,10 @@ class TargetTracker:
         target.moved(stamp_s, views[0].direction(sighting.pixel))
         return self._tell(target, sighting, disparity, views)
 
-    def _lost(self, target: "_Target", reason: str) -> Track:
-        return replace(self._without(TrackStatus.LOST, reason), lock_stamp_s=target.lock_stamp_s)
+    def _lost(self, target: Target, reason: str) -> Track:
+        return Track.nowhere(self._track_id, TrackStatus.LOST, reason, target.lock_stamp_s)
 
-    def _tell(
-        self, target: "_Target", sighting: Sighting, disparity: Disparity, views: tuple[EyeView, EyeView]
-    ) -> Track:
+    def _tell(self, target: Target, sighting: Sighting, disparity: Disparity, views: tuple[EyeView, EyeView]) -> Track:
         """Return the track of a target that was seen in the left eye."""
         expected_d = target.expected_disparity(sighting.pixel, views)
         usable = _plausible(disparity, expected_d, self._parameters.track_disparity_jump_px)
@@ -261,7 +224,7 @@ class TargetTracker:
             target.track_id,
             target.lock_stamp_s,
             sighting.pixel,
-            _NOWHERE,
+            NOWHERE,
             math.nan,
             math.nan,
             math.nan,
@@ -284,66 +247,6 @@ class TargetTracker:
             status=TrackStatus.OK,
             reason="" if disparity.ok else disparity.reason,
         )
-
-
-@dataclass
-class _Target:
-    """What is known of the locked target."""
-
-    track_id: int
-    lock_stamp_s: float
-    looks: Appearance
-    seen_s: float
-    direction: np.ndarray  # unit vector in rig_base when last seen
-    velocity: np.ndarray  # of that vector, per second
-    bounded: bool  # its region was told from what is around
-    hidden: bool = False
-    right_seen_s: float = -math.inf
-    absolute_rad: float = math.nan  # angle by which the right ray is turned against the left one, across
-
-    def predicted(self, stamp_s: float) -> np.ndarray:
-        """Return the direction (3,) in which it should be seen now."""
-        elapsed = stamp_s - self.seen_s
-        rate = math.log(2.0) / _COAST_HALF_LIFE_S
-        travelled = elapsed if not self.hidden else (1.0 - math.exp(-rate * elapsed)) / rate
-        direction = self.direction + self.velocity * travelled
-        return np.asarray(direction / np.linalg.norm(direction))
-
-    def moved(self, stamp_s: float, direction: np.ndarray) -> None:
-        """Take where it is seen now."""
-        elapsed = stamp_s - self.seen_s
-        if elapsed > 0.0:
-            velocity = (direction - self.direction) / elapsed
-            keep = _MOTION_MEMORY if not self.hidden else 0.0
-            self.velocity = keep * self.velocity + (1.0 - keep) * velocity if not self.hidden else self.velocity * 0.0
-        self.direction, self.seen_s, self.hidden = direction, stamp_s, False
-
-    def saw_right(self, stamp_s: float, left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> None:
-        """Keep its parallax, the angle between the two eyes' rays, which changes slowly whatever the eyes do."""
-        self.right_seen_s = stamp_s
-        self.absolute_rad = _across(views[1].direction(right_px)) - _across(views[0].direction(left_px))
-
-    def disparity_age_s(self, stamp_s: float) -> float:
-        """Return how long ago it was last seen in the right eye."""
-        return stamp_s - self.right_seen_s
-
-    def expected_disparity(self, left_px: Pixel, views: tuple[EyeView, EyeView]) -> float | None:
-        """Return the disparity it should have at a left pixel with the eyes as they are, None if never measured."""
-        if math.isnan(self.absolute_rad):
-            return None
-        left = views[0].direction(left_px)
-        angle = _across(left) + self.absolute_rad
-        # Same elevation about the baseline, turned across by the parallax.
-        forward = left * np.array([1.0, 0.0, 1.0])
-        forward /= np.linalg.norm(forward)
-        right = forward * math.cos(angle) + np.array([0.0, math.sin(angle), 0.0])
-        x = views[1].pixel(right)[0]
-        return left_px[0] - x if math.isfinite(x) else None
-
-
-def _across(direction: np.ndarray) -> float:
-    """Return a direction's angle across, towards the left, in the plane through the baseline [rad]."""
-    return math.asin(min(max(float(direction[1]), -1.0), 1.0))
 
 
 def _tolerance_px(disparity_px: float, views: tuple[EyeView, EyeView], baseline_m: float) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.disparity.fovea_pair import cut
-from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image, checked_point
+from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image, Point
 from vergence_metric.fovea_parameters import DisparityParameters
 
 _HALF_SIDE_PX = 100
@@ -30,29 +30,18 @@ class Layer:
     point_px: tuple[float, float]
 
 
-class DepthPolicyEstimator:
+class DepthPolicyEstimator(DisparityEstimator):
     """Asks another estimator at the point that the policy chooses; the answer's `point_px` says where that was."""
 
     def __init__(self, estimator: DisparityEstimator, parameters: DisparityParameters) -> None:
+        self.name = estimator.name
         self._estimator, self._parameters = estimator, parameters
 
-    @property
-    def name(self) -> str:
-        """The name of the estimator that answers."""
-        return self._estimator.name
-
-    def estimate(
-        self,
-        left: Image,
-        right: Image,
-        point_px: tuple[float, float] | None = None,
-        expected_px: float | None = None,
-    ) -> Disparity:
+    def estimate_at(self, left: Image, right: Image, point_px: Point, expected_px: float | None) -> Disparity:
         """Return the disparity of the layer that the policy chooses about a point; see DisparityEstimator."""
-        point = checked_point(left, right, point_px)
-        seen = layers(left, right, self._area(left, point), self._parameters.disparity_max_px)
+        seen = layers(left, right, self._area(left, point_px), self._parameters.disparity_max_px)
         if not seen:
-            found = self._estimator.estimate(left, right, point, expected_px)
+            found = self._estimator.estimate(left, right, point_px, expected_px)
             if not found.ok:
                 return found
             reason = f"no layer is large enough for the policy {self._parameters.disparity_depth_policy}"
@@ -65,7 +54,7 @@ class DepthPolicyEstimator:
             chosen = max(seen, key=lambda layer: layer.area_px)
         return self._estimator.estimate(left, right, chosen.point_px, chosen.disparity_px)
 
-    def _area(self, left: Image, point: tuple[float, float]) -> tuple[int, int, int, int]:
+    def _area(self, left: Image, point: Point) -> tuple[int, int, int, int]:
         """Return x, y, width and height of what is looked at: the box, or a square about the point."""
         height, width = left.shape
         if self._parameters.disparity_depth_policy == "box":

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.disparity.correlation import radius_of
 from vergence_metric.disparity.fovea_pair import FoveaPair, Grey, Strip
-from vergence_metric.disparity.protocol import Disparity, DisparityStatus, Image, checked_point
+from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image, Point
 from vergence_metric.disparity.search import Match, find, pair_about
 from vergence_metric.fovea_parameters import DisparityParameters
 
@@ -34,28 +34,21 @@ class Measure(Protocol):
         ...
 
 
-class MeasuredEstimator:
+class MeasuredEstimator(DisparityEstimator):
     """Finds the point by `search.find`, which also says how sure it is, then measures there in its own way."""
 
     def __init__(self, name: str, measure: Measure, parameters: DisparityParameters) -> None:
         self.name = name
         self._measure, self._parameters = measure, parameters
 
-    def estimate(
-        self,
-        left: Image,
-        right: Image,
-        point_px: tuple[float, float] | None = None,
-        expected_px: float | None = None,
-    ) -> Disparity:
+    def estimate_at(self, left: Image, right: Image, point_px: Point, expected_px: float | None) -> Disparity:
         """Return the disparity at a point; see DisparityEstimator."""
-        point = checked_point(left, right, point_px)
-        pair = pair_about(left, right, point, self._parameters)
+        pair = pair_about(left, right, point_px, self._parameters)
         match = find(pair, self._parameters, expected_px)
         measured = None if math.isnan(match.horizontal_px) else self._measure(pair, match, self._parameters)
-        return self._answer(match, measured, point)
+        return self._answer(match, measured, point_px)
 
-    def _answer(self, match: Match, measured: Measured | None, point: tuple[float, float]) -> Disparity:
+    def _answer(self, match: Match, measured: Measured | None, point: Point) -> Disparity:
         confidence, status, reason = match.evidence.confidence, match.status, match.reason
         kept = measured or Measured(match.horizontal_px, match.vertical_px, match.sigma_px)
         apart = abs(kept.horizontal_px - match.horizontal_px)

@@ -1,14 +1,15 @@
 """What every disparity estimator takes and gives."""
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
+Point = tuple[float, float]
 
 
 class DisparityInputError(ValueError):
@@ -44,7 +45,7 @@ class Disparity:
     status: DisparityStatus
     reason: str
     estimator: str
-    point_px: tuple[float, float]
+    point_px: Point
 
     @property
     def ok(self) -> bool:
@@ -52,25 +53,18 @@ class Disparity:
         return self.status is DisparityStatus.OK
 
     @classmethod
-    def none(cls, status: DisparityStatus, reason: str, estimator: str, point_px: tuple[float, float]) -> "Disparity":
+    def none(cls, status: DisparityStatus, reason: str, estimator: str, point_px: Point) -> "Disparity":
         """Return the absence of an answer, and why."""
         return cls(math.nan, math.nan, math.nan, 0.0, status, reason, estimator, point_px)
 
 
-class DisparityEstimator(Protocol):
-    """Anything that answers with the disparity at a point."""
+class DisparityEstimator(ABC):
+    """Anything that answers with the disparity at a point; `name` is what it is selected by."""
 
-    @property
-    def name(self) -> str:
-        """The name it is selected by."""
-        ...
+    name: str
 
     def estimate(
-        self,
-        left: Image,
-        right: Image,
-        point_px: tuple[float, float] | None = None,
-        expected_px: float | None = None,
+        self, left: Image, right: Image, point_px: Point | None = None, expected_px: float | None = None
     ) -> Disparity:
         """Return the disparity at a point of the left image.
 
@@ -84,10 +78,14 @@ class DisparityEstimator(Protocol):
             DisparityInputError: images that are not grey uint8 of one size, or a point outside them.
 
         """
-        ...
+        return self.estimate_at(left, right, _checked_point(left, right, point_px), expected_px)
+
+    @abstractmethod
+    def estimate_at(self, left: Image, right: Image, point_px: Point, expected_px: float | None) -> Disparity:
+        """Return the same for images and a point that were checked."""
 
 
-def checked_point(left: Image, right: Image, point_px: tuple[float, float] | None) -> tuple[float, float]:
+def _checked_point(left: Image, right: Image, point_px: Point | None) -> Point:
     """Return the point asked for, the centre if None; raise DisparityInputError for input that cannot be."""
     for name, image in (("left", left), ("right", right)):
         if image.ndim != 2 or image.dtype != np.uint8 or image.size == 0:

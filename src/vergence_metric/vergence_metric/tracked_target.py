@@ -1,0 +1,72 @@
+"""The target that the tracker holds: where it should be next, and at which disparity, however the eyes turn."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vergence_metric.appearance import Appearance
+from vergence_metric.eye_watch import EyeView, Pixel
+
+_MOTION_MEMORY = 0.6  # share of the old angular velocity kept at each frame
+_COAST_HALF_LIFE_S = 0.7  # a hidden target's predicted velocity fades: it may have stopped
+
+
+@dataclass
+class Target:
+    """What is known of the locked target, in directions of rig_base, so that turning eyes change nothing."""
+
+    track_id: int
+    lock_stamp_s: float
+    looks: Appearance
+    seen_s: float
+    direction: np.ndarray  # unit vector in rig_base when last seen
+    velocity: np.ndarray  # of that vector, per second
+    bounded: bool  # its region was told from what is around
+    hidden: bool = False
+    right_seen_s: float = -math.inf
+    absolute_rad: float = math.nan  # angle by which the right ray is turned against the left one, across
+
+    def predicted(self, stamp_s: float) -> np.ndarray:
+        """Return the direction (3,) in which it should be seen now."""
+        elapsed = stamp_s - self.seen_s
+        rate = math.log(2.0) / _COAST_HALF_LIFE_S
+        travelled = elapsed if not self.hidden else (1.0 - math.exp(-rate * elapsed)) / rate
+        direction = self.direction + self.velocity * travelled
+        return np.asarray(direction / np.linalg.norm(direction))
+
+    def moved(self, stamp_s: float, direction: np.ndarray) -> None:
+        """Take where it is seen now."""
+        elapsed = stamp_s - self.seen_s
+        if elapsed > 0.0:
+            velocity = (direction - self.direction) / elapsed
+            keep = _MOTION_MEMORY if not self.hidden else 0.0
+            self.velocity = keep * self.velocity + (1.0 - keep) * velocity if not self.hidden else self.velocity * 0.0
+        self.direction, self.seen_s, self.hidden = direction, stamp_s, False
+
+    def saw_right(self, stamp_s: float, left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> None:
+        """Keep its parallax, the angle between the two eyes' rays, which changes slowly whatever the eyes do."""
+        self.right_seen_s = stamp_s
+        self.absolute_rad = _across(views[1].direction(right_px)) - _across(views[0].direction(left_px))
+
+    def disparity_age_s(self, stamp_s: float) -> float:
+        """Return how long ago it was last seen in the right eye."""
+        return stamp_s - self.right_seen_s
+
+    def expected_disparity(self, left_px: Pixel, views: tuple[EyeView, EyeView]) -> float | None:
+        """Return the disparity it should have at a left pixel with the eyes as they are, None if never measured."""
+        if math.isnan(self.absolute_rad):
+            return None
+        left = views[0].direction(left_px)
+        angle = _across(left) + self.absolute_rad
+        # Same elevation about the baseline, turned across by the parallax.
+        forward = left * np.array([1.0, 0.0, 1.0])
+        forward /= np.linalg.norm(forward)
+        right = forward * math.cos(angle) + np.array([0.0, math.sin(angle), 0.0])
+        x = views[1].pixel(right)[0]
+        return left_px[0] - x if math.isfinite(x) else None
+
+
+def _across(direction: np.ndarray) -> float:
+    """Return a direction's angle across, towards the left, in the plane through the baseline [rad]."""
+    return math.asin(min(max(float(direction[1]), -1.0), 1.0))
