@@ -13,8 +13,10 @@ from vergence_servo.gaze.limits import LONGEST_STEP_S, CommandLimits
 from vergence_servo.gaze.observations import (
     BoxSighting,
     EdgeJudgement,
+    EyeRotationReading,
     FoveaDisparity,
     JointReport,
+    JointResolution,
     Observation,
     PointSighting,
     TrackSighting,
@@ -47,7 +49,7 @@ class Hostile:
         return bool(self._random.random() < 0.8)
 
     def observation(self, now_s: float) -> Observation:
-        kind, stamp, skew = self._random.integers(0, 7), self.stamp(now_s), self.value(0.01)
+        kind, stamp, skew = self._random.integers(0, 9), self.stamp(now_s), self.value(0.01)
         v = self.value
         if kind <= 1:
             names = [*JOINT_NAMES, "elbow"]
@@ -60,9 +62,16 @@ class Hostile:
             return TrackSighting(stamp, skew, ids, v(1.0), v(0.3), v(0.2), v(0.1), v(0.001), v(0.1), self.flag())
         if kind == 4:
             name = str(self._random.choice(["target", "", "cup"]))
-            return BoxSighting(stamp, skew, v(0.4), v(0.3), v(0.4), v(0.3), v(0.1), v(0.001), v(0.1), name, self.flag())
+            angles = v(0.4), v(0.3), v(0.4), v(0.3), v(0.1)
+            return BoxSighting(stamp, skew, *angles, v(0.001), v(0.1), name, self.flag(), whole=self.flag())
         if kind == 5:
             return PointSighting(stamp, (v(1.0), v(0.5), v(0.5)), v(0.01))
+        if kind == 6:
+            return EyeRotationReading(stamp, skew, v(0.1), v(0.01), self.flag())
+        if kind == 7:
+            names = [*JOINT_NAMES, "elbow"]
+            steps = {str(name): v(0.01) for name in self._random.choice(names, self._random.integers(1, 5))}
+            return JointResolution(stamp, steps)
         return EdgeJudgement(stamp, abs(v(0.5)), v(3.0), self.flag())
 
     def goal(self) -> Goal:

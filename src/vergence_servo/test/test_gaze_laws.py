@@ -72,7 +72,8 @@ def test_laws_are_made_by_name() -> None:
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_the_servo_inverse_lands_the_shaft_and_then_rests(direction: float) -> None:
     half_play = np.full(3, 0.009)
-    inverse = ServoInverse(half_play, 0.0008, 0.85)
+    servo = ServoSpec(dead_band_rad=0.012, backlash_rad=0.006)
+    inverse = ServoInverse(default_rig().with_servos(servo), 0.0008, 0.85)
     shaft, command = np.zeros(3), np.zeros(3)
     wanted = np.full(3, direction * 0.2)
     for _ in range(5):

@@ -9,7 +9,7 @@ from geometry_msgs.msg import PointStamped
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from sensor_msgs.msg import CameraInfo, JointState
 from std_srvs.srv import SetBool, Trigger
@@ -72,6 +72,11 @@ class GazeControllerNode(Node):
         self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point")
         self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1))
         watch.create_subscription(JointState, "joint_states", lambda m: self._take(convert.joint_report(m)))
+        # Latched: one message per start of the servos' driver.
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        watch.create_subscription(
+            JointState, "servo_node/resolution", lambda m: self._take(convert.joint_resolution(m)), latched
+        )
         watch.create_subscription(EdgeVergence, "vergence/edge", lambda m: self._take(convert.edge_judgement(m)))
         watch.create_subscription(
             VergenceError, "vergence/error", lambda m: self._take(convert.fovea_disparity(m, self._left.fx_px))

@@ -23,6 +23,7 @@ from vergence_servo.gaze.observations import (
     EyeRotationReading,
     FoveaDisparity,
     JointReport,
+    JointResolution,
     TrackSighting,
 )
 from vergence_servo.gaze.report import GazeReport
@@ -37,6 +38,11 @@ _RAY_M = 2.0
 def joint_report(message: JointState) -> JointReport:
     """Return the positions by name; a message with fewer positions than names gives those there are."""
     return JointReport(to_seconds(message.header.stamp), dict(zip(message.name, message.position, strict=False)))
+
+
+def joint_resolution(message: JointState) -> JointResolution:
+    """Return the smallest step of each joint, which servo_node publishes as positions."""
+    return JointResolution(to_seconds(message.header.stamp), dict(zip(message.name, message.position, strict=False)))
 
 
 def fovea_disparity(message: VergenceError, focal_px: float) -> FoveaDisparity:
@@ -95,6 +101,7 @@ def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
         usable=message.status in seen
         and (math.isfinite(message.left_azimuth_rad) or math.isfinite(message.right_azimuth_rad)),
         reason=message.reason,
+        whole=message.status not in (BoxVergence.STATUS_CUT, BoxVergence.STATUS_OCCLUDED),
     )
 
 

@@ -5,12 +5,14 @@ are exact for the left eye at any distance, since tilting the bar does not move 
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.geometry import UnreachableError, angles_of_direction, gaze_for_point, rotation_rig_from_eye
 from vergence_servo.gaze.joint_history import JointHistory
+from vergence_servo.gaze.observations import BoxSighting, TrackSighting
 from vergence_servo.gaze.target_filter import Measurement
 
 Array = npt.NDArray[np.float64]
@@ -23,6 +25,7 @@ _TILT = (0.0, 0.0, 1.0)
 _VERSION = (1.0, 0.0, 0.0)
 
 _LARGEST_TANGENT = 10.0
+_WIDEST_RAD = 1.5
 
 
 class SightingError(ValueError):
@@ -109,6 +112,57 @@ def point(
     values = np.array([eyes.version_rad, eyes.vergence_rad, eyes.tilt_rad])
     rows = np.array([_VERSION, _VERGENCE, _TILT])
     return Measurement(rows, values, np.array([sigma_rad] * 3), np.array([stamp_s] * 3))
+
+
+def track(
+    history: JointHistory, sighting: TrackSighting, sigma_rad: float, disparity_sigma_rad: float
+) -> tuple[Measurement, Array]:
+    """Return the measurement of a track, and (left pan, right pan, tilt) (3,) [rad] of what it follows.
+
+    The right pan is NaN where only the left eye sees it.
+    """
+    left_xy = (sighting.left_x, sighting.left_y)
+    if math.isfinite(sighting.disparity_rad):
+        right_x = _tangent(math.atan(sighting.left_x) - sighting.disparity_rad)
+        measurement, seen = both_eyes(
+            history, sighting.stamp_s, sighting.skew_s, left_xy, right_x, sigma_rad, disparity_sigma_rad
+        )
+        return measurement, np.array(seen)
+    measurement, (pan, tilt) = one_eye(history, True, sighting.stamp_s, *left_xy, sigma_rad)
+    return measurement, np.array([pan, math.nan, tilt])
+
+
+def box(
+    history: JointHistory, sighting: BoxSighting, sigma_rad: float, disparity_sigma_rad: float = 0.0
+) -> tuple[Measurement, Array]:
+    """Return the measurement of a detected target, and its (left pan, right pan, tilt) (3,) [rad], NaN where unseen.
+
+    The disparity of the surface inside the boxes, where there is one, is better than that of their centres.
+    """
+    left_xy = (_tangent(sighting.left_azimuth_rad), _tangent(sighting.left_elevation_rad))
+    right_xy = (_tangent(sighting.right_azimuth_rad), _tangent(sighting.right_elevation_rad))
+    if math.isfinite(left_xy[0]) and math.isfinite(right_xy[0]):
+        disparity = sighting.surface_disparity_rad
+        right_x = _tangent(sighting.left_azimuth_rad - disparity) if math.isfinite(disparity) else right_xy[0]
+        measurement, both = both_eyes(
+            history, sighting.stamp_s, sighting.skew_s, left_xy, right_x, sigma_rad, disparity_sigma_rad
+        )
+        return measurement, np.array(both)
+    in_left = math.isfinite(left_xy[0])
+    stamp_s = sighting.stamp_s + (0.0 if in_left else sighting.skew_s)
+    measurement, (pan, tilt) = one_eye(history, in_left, stamp_s, *(left_xy if in_left else right_xy), sigma_rad)
+    return measurement, np.array([pan if in_left else math.nan, math.nan if in_left else pan, tilt])
+
+
+def shifted(measurement: Measurement, pan_rad: float, tilt_rad: float) -> Measurement:
+    """Return the measurement of a point this far beside the one that was seen, at the same depth [rad]."""
+    by = np.where(measurement.coefficients[:, 2] != 0, tilt_rad, pan_rad)
+    return replace(measurement, values=measurement.values + by)
+
+
+def _tangent(angle_rad: float) -> float:
+    """Return the normalised coordinate of an angle; NaN for one that no lens sees."""
+    return math.tan(angle_rad) if abs(angle_rad) < _WIDEST_RAD else math.nan
 
 
 def _joints(history: JointHistory, stamp_s: float) -> Array:

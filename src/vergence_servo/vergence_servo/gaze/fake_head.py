@@ -49,14 +49,16 @@ class Seeing:
     box_noise_px: float = 1.5
     box_miss_share: float = 0.05
     field_margin_px: float = 15.0
+    extent_rad: float = 0.1
 
 
 @dataclass
 class FakeHead:
     """Rig, true servos, target and eyes. `visible(t)` hides the target; `target(t)` gives it (3,) in rig_base [m].
 
-    `clutter(t)` is a point that lies at the fovea while the target is hidden (an occluder), or None. `servos` are the
-    servos as they really are, by joint, where they differ from what the rig's description says. Time begins at
+    `clutter(t)` is a point that lies at the fovea while the target is hidden (an occluder), or None. `mistaken` says,
+    by estimator ("fovea", "track", "box"), what it takes for the target at `t`, or None while it is right. `servos` are
+    the servos as they really are, by joint, where they differ from what the rig's description says. Time begins at
     `begin_s`.
     """
 
@@ -67,6 +69,7 @@ class FakeHead:
     start_rad: Mapping[str, float] = field(default_factory=dict)
     visible: Callable[[float], bool] = lambda time_s: True
     clutter: Callable[[float], Array] | None = None
+    mistaken: Mapping[str, Callable[[float], Array | None]] = field(default_factory=dict)
     servos: Mapping[str, ServoSpec] = field(default_factory=dict)
     begin_s: float = 0.0
 
@@ -188,28 +191,40 @@ class FakeHead:
                     self._lock_s,
                     float(left_xy[0]),
                     float(left_xy[1]),
-                    disparity,
+                    disparity + self._mistake_rad("track", left_s, disparity),
                     sigma,
-                    0.1,
+                    seeing.extent_rad,
                     usable,
                 ),
             )
         on_fovea = in_left and math.hypot(*left_xy) < 0.05
+        at_fovea = disparity + self._mistake_rad("fovea", left_s, disparity)
         if seeing.fovea:
-            value = disparity if on_fovea else math.nan
+            value = at_fovea if on_fovea else math.nan
             if not visible and self.clutter is not None:
                 left, right = self.project(self.clutter(left_s), True), self.project(self.clutter(left_s), False)
                 value = math.atan(left[0]) - math.atan(right[0])
             usable = math.isfinite(value) and abs(value) < math.atan(150.0 / focal)
             self._send(arrival_s, FoveaDisparity(left_s, skew_s, value, sigma, 0.9 if usable else 0.0, usable))
-        pixels = abs(disparity) * focal if on_fovea and in_right else math.inf
+        pixels = abs(at_fovea) * focal if on_fovea and in_right else math.inf
         contrast = 0.3 + 0.68 * (1.0 - math.exp(-((pixels / 3.6) ** 1.2))) + self._random.normal(0.0, 0.03)
         self._send(arrival_s, EdgeJudgement(left_s, contrast, min(pixels, 8.0) + 1.0, False))
         if seeing.boxes and self._ticks % seeing.box_frame_ticks < seeing.frame_ticks:
             self._see_boxes(left_s, skew_s, left_xy if in_left else None, right_xy if in_right else None)
 
+    def _mistake_rad(self, estimator: str, time_s: float, disparity_rad: float) -> float:
+        """Return how far an estimator's disparity is off because it is of something else; 0 if it is not."""
+        other = self.mistaken[estimator](time_s) if estimator in self.mistaken else None
+        if other is None or not math.isfinite(disparity_rad):
+            return 0.0
+        left, right = self.project(other, left=True), self.project(other, left=False)
+        return math.atan(left[0]) - math.atan(right[0]) - disparity_rad
+
     def _see_boxes(self, left_s: float, skew_s: float, left_xy: Array | None, right_xy: Array | None) -> None:
         seeing, focal = self.seeing, self.rig.left_camera.fx_px
+        elsewhere = self.mistaken["box"](left_s) if "box" in self.mistaken else None
+        if elsewhere is not None:
+            left_xy, right_xy = self.project(elsewhere, left=True), self.project(elsewhere, left=False)
         if self._random.random() < seeing.box_miss_share:
             left_xy = right_xy = None
         angles = np.full(4, math.nan)
@@ -229,7 +244,7 @@ class FakeHead:
                 right_elevation_rad=float(angles[3]),
                 surface_disparity_rad=math.nan,
                 sigma_rad=seeing.box_noise_px / focal,
-                extent_rad=0.1,
+                extent_rad=seeing.extent_rad,
                 class_name="target" if usable else "",
                 usable=usable,
             ),

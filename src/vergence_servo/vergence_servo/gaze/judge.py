@@ -17,6 +17,8 @@ class VergedJudge:
         self._contrast_s = -math.inf
         self._good = self._bad = 0
         self._last_pair_s = -math.inf
+        self.unresolved_rad = 0.0
+        """Error that the servos cannot mend, beyond what the limits were made for: it keeps nobody from `verged`."""
         self.contrast = math.nan
         self.edge_verged = False
         self.verged = False
@@ -55,7 +57,9 @@ class VergedJudge:
         if not stamp_s > self._last_pair_s:
             return self.verged
         self._last_pair_s = stamp_s
-        limit = self._p.verged_leave_rad if self.verged else self._p.verged_enter_rad
+        leave_rad = self._p.verged_leave_rad
+        enter_rad = min(self._p.verged_enter_rad + self.unresolved_rad, leave_rad)
+        limit = leave_rad if self.verged else enter_rad
         contrast_good, contrast_text = self._contrast_says(stamp_s, now_s)
         if not abs(error_rad) <= limit:
             good, self.reason = False, f"error {math.degrees(abs(error_rad)):.2f} deg"

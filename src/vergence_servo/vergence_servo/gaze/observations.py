@@ -18,6 +18,14 @@ class JointReport:
 
 
 @dataclass(frozen=True)
+class JointResolution:
+    """The smallest step of each joint [rad] by name, as the servos' driver really has it."""
+
+    stamp_s: float
+    steps_rad: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class FoveaDisparity:
     """Signed disparity at the left image's centre, atan(x_left) - atan(x_right) [rad]; `usable` if it was measured."""
 
@@ -55,7 +63,8 @@ class BoxSighting:
     """The detected target: its direction in each eye [rad] (right positive, down positive), NaN where unseen.
 
     `surface_disparity_rad` is the refined disparity of the surface inside the boxes, NaN if not refined;
-    `extent_rad` is the angular width of the left box.
+    `extent_rad` is the angular width of the left box; `whole` is False for boxes cut by the border or partly hidden,
+    whose centres are not the object's.
     """
 
     stamp_s: float
@@ -70,6 +79,7 @@ class BoxSighting:
     class_name: str
     usable: bool
     reason: str = ""
+    whole: bool = True
 
 
 @dataclass(frozen=True)
@@ -107,5 +117,12 @@ class EyeRotationReading:
 
 
 Observation: TypeAlias = (
-    JointReport | FoveaDisparity | TrackSighting | BoxSighting | PointSighting | EdgeJudgement | EyeRotationReading
+    JointReport
+    | JointResolution
+    | FoveaDisparity
+    | TrackSighting
+    | BoxSighting
+    | PointSighting
+    | EdgeJudgement
+    | EyeRotationReading
 )

@@ -51,6 +51,13 @@ class GazeParameters(Parameters):
     jump_count: int = parameter(
         2, "outliers that agree with one another before the target has jumped", minimum=1, maximum=20
     )
+    distractor_patience_s: float = parameter(
+        1.0,
+        "how long boxes elsewhere are not believed while the fovea still sees the target's depth",
+        unit="s",
+        minimum=0,
+        maximum=60,
+    )
     prior_vergence_rad: float = parameter(
         0.065, "vergence assumed for a target of unknown distance", unit="rad", minimum=0, maximum=1
     )

@@ -8,19 +8,29 @@ direction of motion, and is slow to turn round: a joint that turned at every noi
 import numpy as np
 import numpy.typing as npt
 
+from vergence_rig.rig import Rig
+from vergence_servo.gaze.resolution import pulse_steps_rad
+
 Array = npt.NDArray[np.float64]
 
 _TURN_SHARE = 0.17
 _MOVE_SHARE = 0.12
+_STEP_SHARE = 0.6
 
 
 class ServoInverse:
-    """Overdrives each joint (3,) past its play. `trust` is the share of the play crossed at once when turning round."""
+    """Overdrives each joint (3,) past its play, and leaves alone what its smallest step cannot mend.
 
-    def __init__(self, half_play_rad: Array, tolerance_rad: float, trust: float) -> None:
-        self._half_play = half_play_rad
-        self._tolerance = tolerance_rad + _MOVE_SHARE * half_play_rad
-        self._turn_tolerance = tolerance_rad + 2.0 * _TURN_SHARE * half_play_rad
+    `trust` is the share of the play crossed at once when turning round.
+    """
+
+    def __init__(self, rig: Rig, tolerance_rad: float, trust: float) -> None:
+        servos = [joint.servo for _, joint in rig.joints.items()]
+        self._half_play = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
+        # The next step would be no nearer.
+        unresolved = _STEP_SHARE * pulse_steps_rad(rig)
+        self._tolerance = np.maximum(tolerance_rad + _MOVE_SHARE * self._half_play, unresolved)
+        self._turn_tolerance = np.maximum(tolerance_rad + 2.0 * _TURN_SHARE * self._half_play, unresolved)
         self._trust = trust
         self._direction = np.zeros(3)
 

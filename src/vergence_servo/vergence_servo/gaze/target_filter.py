@@ -206,7 +206,8 @@ class TargetFilter:
             self._jump(measurement)
             terms = [model.innovation(measurement, self._time_s) for model in self._models]
         else:
-            self._outliers.clear()
+            # A depth that fits says nothing against a direction that does not.
+            self._outliers = [before for before in self._outliers if not _alike(before, measurement)]
             losses = [0.5 * (fit + math.log(np.linalg.det(term[2]))) for fit, term in zip(fits, terms, strict=True)]
             if self._weigh(losses[0] - losses[1]):
                 terms = [model.innovation(measurement, self._time_s) for model in self._models]
@@ -263,9 +264,7 @@ class TargetFilter:
         comparable = [
             before
             for before in self._outliers
-            if before.coefficients.shape == measurement.coefficients.shape
-            and np.array_equal(before.coefficients, measurement.coefficients)
-            and measurement.stamp_s - before.stamp_s < 0.5
+            if _alike(before, measurement) and measurement.stamp_s - before.stamp_s < 0.5
         ]
         self._outliers = [*comparable[-self._jump_count :], measurement]
         if len(self._outliers) < self._jump_count:
@@ -296,3 +295,8 @@ class TargetFilter:
                 model.covariance[1::2, 1::2] += np.eye(3) * _RATE_SIGMA_RAD_S**2
         self._evidence, self._moving = 0.0, False
         self._outliers.clear()
+
+
+def _alike(one: Measurement, other: Measurement) -> bool:
+    """Tell whether two measurements are of the same kind."""
+    return np.array_equal(one.coefficients, other.coefficients)

@@ -1,21 +1,24 @@
 """Which sightings are of the wanted target, and what they say of it: the way from observations into the filter.
 
 The wanted target is given once (a click, a point, a class). From then on it is followed by the class-free tracker once
-that has locked on it, by boxes of the wanted class, or by a stream of points; the disparity at the left fovea gives the
-depth of whatever lies there, and counts while the target does.
+that has locked on it, by boxes of the wanted class or around what was asked for, or by a stream of points; the
+disparity at the left fovea gives the depth of whatever lies there, and counts while the target does. Where boxes and
+fovea differ, the boxes' depth is the target's.
 """
 
 import math
-from collections import deque
 
 import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.rig import Rig
 from vergence_servo.gaze import directions
+from vergence_servo.gaze.agreement import Agreement
 from vergence_servo.gaze.directions import SightingError
 from vergence_servo.gaze.joint_history import JointHistory
+from vergence_servo.gaze.joint_moves import JointMoves
 from vergence_servo.gaze.laws.protocol import VisualError
+from vergence_servo.gaze.locks import BoxLock, TrackLock
 from vergence_servo.gaze.observations import BoxSighting, FoveaDisparity, PointSighting, TrackSighting
 from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.target_filter import Measurement, TargetEstimate, TargetFilter
@@ -23,22 +26,18 @@ from vergence_servo.gaze.target_filter import Measurement, TargetEstimate, Targe
 Array = npt.NDArray[np.float64]
 
 _TIMING_SIGMA_S = 0.003
-_MOVE_VARIANCE_RAD = 8e-3
-_TURN_SHARE = 0.35
-_FIRST_SHARE = 0.6
 _FRESH_S = 0.15
-_DISAGREEING_PAIRS = 5
+_BOX_LATE_S = 0.4
 _SAME_DEPTH_RAD = 0.006
 _SIGMA_BOUNDS_RAD = (1e-5, 0.5)
-_WIDEST_RAD = 1.5
 
 
 class TargetTracking:
     """Holds the filter and decides what goes into it."""
 
-    def __init__(self, rig: Rig, parameters: GazeParameters, history: JointHistory) -> None:
+    def __init__(self, rig: Rig, parameters: GazeParameters, history: JointHistory, moves: JointMoves) -> None:
         self._p = parameters
-        self._history = history
+        self._history, self._moves = history, moves
         self._baseline_m = rig.baseline_m
         self.filter = TargetFilter(
             parameters.follow_acceleration_rad_s2,
@@ -46,9 +45,7 @@ class TargetTracking:
             parameters.gate_sigma,
             parameters.jump_count,
         )
-        self._last_reported: Array | None = None
-        self._last_direction = np.zeros(3)
-        self._moves: deque[tuple[float, Array]] = deque(maxlen=200)
+        self._agreement = Agreement(parameters.disagreement_rad)
         self.clear()
 
     def clear(self) -> None:
@@ -60,13 +57,12 @@ class TargetTracking:
         self.seen_s = math.nan
         self.source = ""
         self.note = ""
-        self._track_id: int | None = None
-        self._track_offset = (0.0, 0.0)
-        self._track_seen_s = -math.inf
+        self._track, self._boxes = TrackLock(), BoxLock()
+        self._agreement.clear()
         self._wanted_since_s = -math.inf
-        self._target_seen_s = -math.inf
-        self._disagreeing = 0
-        self._track_vergence: tuple[float, float, float] = (-math.inf, math.nan, 0.0)
+        self._target_seen_s = self._fovea_agreed_s = -math.inf
+        self._boxes_off_since_s = math.nan
+        self._fovea_was_astray = False
 
     def want(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
         """Begin with a target at version, vergence, tilt (3,) with this covariance (3, 3), as seen at `stamp_s`."""
@@ -90,77 +86,31 @@ class TargetTracking:
     @property
     def disagreement(self) -> bool:
         """True while two estimators differ by more than the object's own depth explains."""
-        return self._disagreeing >= _DISAGREEING_PAIRS
+        return self._agreement.disagreement
 
     @property
     def doubtful(self) -> bool:
         """True if estimators have just differed, though not for long enough to call it a disagreement."""
-        return self._disagreeing > 0
+        return self._agreement.doubtful
 
     def estimate(self, time_s: float) -> TargetEstimate | None:
         """Return the target at `time_s`, or None if there is none."""
         return self.filter.at(time_s) if self.filter.initialised else None
 
-    def note_motion(self) -> bool:
-        """Take how the joints have moved in the newest report as doubt about their angles, from its stamp on.
-
-        Returns whether a pan has moved.
-        """
-        reported = self._history.reported_rad
-        if self._last_reported is None:
-            self._last_reported = reported
-            return True
-        move = reported - self._last_reported
-        if not np.any(move):
-            return False
-        self._last_reported = reported
-        half_play = self._history.half_play_rad
-        direction = np.sign(move)
-        turned = (direction != 0) & (direction != self._last_direction)
-        # Before its first move a shaft may lie anywhere in its play.
-        share = np.where(self._last_direction == 0, _FIRST_SHARE, _TURN_SHARE)
-        self._last_direction = np.where(direction != 0, direction, self._last_direction)
-        variances = _MOVE_VARIANCE_RAD * half_play * np.abs(move) + turned * (share * half_play) ** 2
-        if np.any(variances):
-            self._moves.append((self._history.newest_s, variances))
-        return bool(np.any(move[:2]))
-
-    def _loosen_before(self, stamp_s: float) -> None:
-        """Tell the filter of the moves before an exposure: an image from before a move knows nothing of its doubt."""
-        while self._moves and self._moves[0][0] <= stamp_s:
-            self.filter.loosen(self._moves.popleft()[1])
-
     def see_track(self, sighting: TrackSighting, now_s: float) -> bool:
         """Take a track; True if it was the target's and was believed."""
         if not sighting.usable or not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
-        joints = self._history.shaft_at(sighting.stamp_s)
-        pan, tilt = directions.direction_angles(joints[0], joints[2], sighting.left_x, sighting.left_y)
-        if not self._is_wanted_track(sighting, pan, tilt):
-            return False
-        offset_pan, offset_tilt = self._track_offset
         sigma = self._sigma(sighting.stamp_s, self._p.direction_sigma_rad)
-        if math.isfinite(sighting.disparity_rad):
-            right_x = _tangent(math.atan(sighting.left_x) - sighting.disparity_rad)
-            measurement, (left_pan, right_pan, seen_tilt) = directions.both_eyes(
-                self._history,
-                sighting.stamp_s,
-                sighting.skew_s,
-                (sighting.left_x, sighting.left_y),
-                right_x,
-                sigma,
-                _positive(sighting.sigma_rad, self._p.direction_sigma_rad),
-            )
-            self._track_vergence = (sighting.stamp_s, right_pan - left_pan, sighting.extent_rad)
-            measurement.values[:] += (offset_pan, offset_pan, offset_tilt)
-            seen = np.array([left_pan + offset_pan, right_pan + offset_pan, seen_tilt + offset_tilt])
-        else:
-            measurement, (left_pan, seen_tilt) = directions.one_eye(
-                self._history, True, sighting.stamp_s, sighting.left_x, sighting.left_y, sigma
-            )
-            measurement.values[:] += (offset_pan, offset_tilt)
-            seen = np.array([left_pan + offset_pan, math.nan, seen_tilt + offset_tilt])
-        self._track_seen_s = sighting.stamp_s
+        disparity_sigma = _positive(sighting.sigma_rad, self._p.direction_sigma_rad)
+        measurement, seen = directions.track(self._history, sighting, sigma, disparity_sigma)
+        if not self._is_wanted_track(sighting, seen):
+            return False
+        if math.isfinite(seen[1]):
+            vergence = float(seen[1] - seen[0])
+            self._agreement.see_track(sighting.stamp_s, vergence, _own_depth(vergence, sighting.extent_rad))
+        pan, tilt = self._track.offset
+        measurement, seen = directions.shifted(measurement, pan, tilt), seen + np.array([pan, pan, tilt])
         return self._believe(measurement, seen, sighting.skew_s, now_s, "track")
 
     def see_fovea(self, sighting: FoveaDisparity, now_s: float) -> bool:
@@ -168,20 +118,22 @@ class TargetTracking:
         if not (sighting.usable and sighting.confidence >= self._p.minimum_confidence):
             self.note = sighting.reason or "no confident disparity at the fovea"
             return False
-        if not self.eyes_were_still(sighting.stamp_s, sighting.skew_s) or not self._at_fovea(sighting.stamp_s):
+        stamp_s = sighting.stamp_s
+        if not self.eyes_were_still(stamp_s, sighting.skew_s) or not self._at_fovea(stamp_s):
             return False
-        sigma = self._sigma(sighting.stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
-        measurement = directions.fovea_vergence(
-            self._history, sighting.stamp_s, sighting.skew_s, sighting.horizontal_rad, sigma
-        )
+        sigma = self._sigma(stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
+        measurement = directions.fovea_vergence(self._history, stamp_s, sighting.skew_s, sighting.horizontal_rad, sigma)
         vergence = float(measurement.values[0])
-        self._compare_with_track(sighting.stamp_s, vergence)
-        if sighting.stamp_s - self._track_vergence[0] < _FRESH_S:
+        self._agreement.see_fovea(stamp_s, vergence)
+        if self._agreement.track_is_fresh(stamp_s, _FRESH_S):
             return False  # the tracker measures the target itself; the fovea only whatever lies there
-        joints = self._history.shaft_at(sighting.stamp_s)
+        if not self._agreement.fovea_may_be_the_target(stamp_s, vergence):
+            self.note = "the fovea looks past the target that the boxes show"
+            return False
+        joints = self._history.shaft_at(stamp_s)
         seen = np.array([math.nan, joints[0] + vergence, math.nan])
-        established = self._track_id is not None or self.class_name is not None
-        if established and not self._still_at_its_depth(vergence, sighting.stamp_s, now_s):
+        established = self._track.track_id is not None or self.class_name is not None or self._boxes.count > 0
+        if established and not self._still_at_its_depth(vergence, stamp_s, now_s):
             self.note = "something at another depth lies at the fovea"
             return False
         return self._believe(measurement, seen, sighting.skew_s, now_s, "fovea", may_jump=not established)
@@ -194,31 +146,61 @@ class TargetTracking:
         return estimate is not None and abs(vergence_rad - estimate.vergence_rad) < _SAME_DEPTH_RAD
 
     def see_box(self, sighting: BoxSighting, now_s: float) -> bool:
-        """Take a detected target; True if it is of the wanted class and was believed."""
-        if self.class_name is None or not sighting.usable or self.class_name not in ("", sighting.class_name):
+        """Take a detected target; True if it is what is wanted, by its class or by its place, and was believed."""
+        by_class = self.class_name is not None
+        if not sighting.usable or self.class_name not in (None, "", sighting.class_name):
+            return False
+        if not (by_class or (sighting.whole and self.filter.initialised)):
             return False
         if not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
         sigma = self._sigma(sighting.stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
-        left = (_tangent(sighting.left_azimuth_rad), _tangent(sighting.left_elevation_rad))
-        right = (_tangent(sighting.right_azimuth_rad), _tangent(sighting.right_elevation_rad))
-        if math.isfinite(left[0]) and math.isfinite(right[0]):
-            disparity = sighting.surface_disparity_rad
-            right_x = _tangent(sighting.left_azimuth_rad - disparity) if math.isfinite(disparity) else right[0]
-            measurement, seen_both = directions.both_eyes(
-                self._history, sighting.stamp_s, sighting.skew_s, left, right_x, sigma, 0.0
-            )
-            seen = np.array(seen_both)
-        else:
-            in_left = math.isfinite(left[0])
-            stamp_s = sighting.stamp_s + (0.0 if in_left else sighting.skew_s)
-            measurement, (pan, tilt) = directions.one_eye(
-                self._history, in_left, stamp_s, *(left if in_left else right), sigma
-            )
-            seen = np.array([pan if in_left else math.nan, math.nan if in_left else pan, tilt])
-        if not self.filter.initialised:
+        measurement, seen = directions.box(self._history, sighting, sigma)
+        vergence = float(seen[1] - seen[0])
+        own_depth = _own_depth(vergence, sighting.extent_rad)
+        if not by_class:
+            if not self._contains_target(sighting, seen, own_depth):
+                return False
+            pan, tilt = (float(angle) for angle in self._boxes.offset)
+            measurement, seen = directions.shifted(measurement, pan, tilt), seen + np.array([pan, pan, tilt])
+        elif not self.filter.initialised:
             self._start_from(measurement)
-        return self._believe(measurement, seen, sighting.skew_s, now_s, "box")
+        believed = self._believe(
+            measurement, seen, sighting.skew_s, now_s, "box", may_jump=not by_class or self._boxes_may_jump(now_s)
+        )
+        if believed or not by_class:
+            self._agreement.see_box(sighting.stamp_s, vergence, math.sqrt(2.0) * sigma, own_depth)
+            self._heed_boxes(sighting.stamp_s)
+        self._boxes_off_since_s = math.nan if believed else _first(self._boxes_off_since_s, now_s)
+        return believed
+
+    def _contains_target(self, sighting: BoxSighting, seen_rad: Array, own_depth_rad: float) -> bool:
+        """Tell whether boxes are around what was asked for. They may correct the fovea, but not a sure tracker."""
+        estimate = self.estimate(sighting.stamp_s)
+        if estimate is None:
+            return False
+        bound = math.inf
+        if self._agreement.track_is_fresh(sighting.stamp_s, _BOX_LATE_S) and not self.doubtful:
+            bound = self._p.disagreement_rad + own_depth_rad + 4.0 * float(estimate.sigmas_rad[1])
+        return self._boxes.adopt(seen_rad, sighting.extent_rad, bound, estimate)
+
+    def _boxes_may_jump(self, now_s: float) -> bool:
+        """Tell whether boxes elsewhere may be the target's: not while the fovea sees its depth, for a while."""
+        off_s = now_s - _first(self._boxes_off_since_s, now_s)
+        return now_s - self._fovea_agreed_s > _FRESH_S or off_s >= self._p.distractor_patience_s
+
+    def _heed_boxes(self, stamp_s: float) -> None:
+        """Let go of what the boxes say is not the target."""
+        astray = self._agreement.fovea_is_astray(stamp_s)
+        # What they told before is in the estimate: the boxes may now move it.
+        off_rad = self._agreement.fovea_off_rad if astray and not self._fovea_was_astray else 0.0
+        if self._track.track_id is not None and self._agreement.track_is_astray(stamp_s) and not astray:
+            off_rad = self._agreement.track_off_rad
+            self._track.refuse()
+            self._agreement.drop_track()
+        if off_rad:
+            self.filter.loosen(np.array([0.5, 0.5, 0.0]) * off_rad**2)
+        self._fovea_was_astray = astray
 
     def see_point(self, sighting: PointSighting, now_s: float) -> bool:
         """Take a point of the stream; True if the stream is wanted and the point was believed."""
@@ -235,7 +217,8 @@ class TargetTracking:
     def _believe(
         self, measurement: Measurement, seen_rad: Array, skew_s: float, now_s: float, source: str, may_jump: bool = True
     ) -> bool:
-        self._loosen_before(measurement.stamp_s)
+        for variances in self._moves.take_before(measurement.stamp_s):
+            self.filter.loosen(variances)
         if not self.filter.update(measurement, may_jump):
             self.note = (
                 f"{source} differs from the prediction by {math.degrees(self.filter.last_innovation_rad):.1f} deg"
@@ -249,7 +232,9 @@ class TargetTracking:
         error_rad = seen_rad - np.array([at_left[0], at_right[1], at_left[2]])
         self.visual = VisualError(measurement.stamp_s, seen_rad, error_rad)
         self.seen_s, self.source, self.note = now_s, source, ""
-        if source != "fovea":
+        if source == "fovea":
+            self._fovea_agreed_s = now_s
+        else:
             self._target_seen_s = now_s
         return True
 
@@ -282,47 +267,27 @@ class TargetTracking:
         joints, target = self._history.shaft_at(stamp_s), estimate.joints_rad
         return math.hypot(target[0] - joints[0], target[2] - joints[2]) <= self._p.fovea_radius_rad
 
-    def _is_wanted_track(self, sighting: TrackSighting, pan: float, tilt: float) -> bool:
+    def _is_wanted_track(self, sighting: TrackSighting, seen_rad: Array) -> bool:
         if self.class_name is not None or self.takes_stream:
             return False
-        if sighting.track_id == self._track_id:
+        if sighting.track_id == self._track.track_id:
             return True
         estimate = self.estimate(sighting.stamp_s)
         if estimate is None or sighting.stamp_s < self._wanted_since_s:
             return False
         joints = estimate.joints_rad
-        offset = (float(joints[0] - pan), float(joints[2] - tilt))
-        distance = math.hypot(*offset)
-        if distance > self._p.adopt_radius_rad:
-            self.note = f"the tracker follows something {math.degrees(distance):.1f} deg away"
-            return False
-        vergence_off = self._track_vergence_off(sighting, estimate)
-        if abs(vergence_off) > 4.0 * float(estimate.sigmas_rad[1]) + self._p.disagreement_rad:
-            self.note = f"the tracker follows something {math.degrees(vergence_off):.1f} deg nearer or farther"
-            return False
-        # The first lock after a click keeps the click: what was asked for may lie beside the middle of what is tracked,
-        # and a tracker that did not lock anew because the move was small still follows its old target next to it.
-        first = self._track_id is None
-        self._track_offset = offset if first else (0.0, 0.0)
-        self._track_id = sighting.track_id
-        return True
-
-    def _track_vergence_off(self, sighting: TrackSighting, estimate: TargetEstimate) -> float:
-        """Return by how much the track's vergence differs from the target's [rad]; 0 while it has none."""
-        if not math.isfinite(sighting.disparity_rad):
-            return 0.0
-        shaft = self._history.shaft_at(sighting.stamp_s)
-        return float(shaft[1] - shaft[0]) + sighting.disparity_rad - estimate.vergence_rad
-
-    def _compare_with_track(self, stamp_s: float, vergence_rad: float) -> None:
-        track_s, track_vergence, extent = self._track_vergence
-        if abs(track_s - stamp_s) > 1e-6:
-            return
-        own_depth = abs(vergence_rad) * (extent if math.isfinite(extent) else 0.0)
-        if abs(vergence_rad - track_vergence) > self._p.disagreement_rad + own_depth:
-            self._disagreeing = min(self._disagreeing + 1, 2 * _DISAGREEING_PAIRS)
-        else:
-            self._disagreeing = max(self._disagreeing - 2, 0)
+        offset = (float(joints[0] - seen_rad[0]), float(joints[2] - seen_rad[2]))
+        deeper = float(seen_rad[1] - seen_rad[0]) - estimate.vergence_rad
+        why_not = self._track.adopt(
+            sighting.track_id,
+            offset,
+            deeper if math.isfinite(deeper) else 0.0,
+            estimate,
+            self._p.adopt_radius_rad,
+            self._p.disagreement_rad,
+        )
+        self.note = why_not or self.note
+        return not why_not
 
 
 def _positive(sigma_rad: float, fallback_rad: float) -> float:
@@ -331,9 +296,13 @@ def _positive(sigma_rad: float, fallback_rad: float) -> float:
     return min(max(sigma_rad, _SIGMA_BOUNDS_RAD[0]), _SIGMA_BOUNDS_RAD[1])
 
 
-def _tangent(angle_rad: float) -> float:
-    """Return the normalised coordinate of an angle; NaN for one that no lens sees."""
-    return math.tan(angle_rad) if abs(angle_rad) < _WIDEST_RAD else math.nan
+def _own_depth(vergence_rad: float, extent_rad: float) -> float:
+    """Return by how much vergence may differ over an object that is as deep as wide."""
+    return abs(vergence_rad) * extent_rad if math.isfinite(extent_rad * vergence_rad) else 0.0
+
+
+def _first(since_s: float, now_s: float) -> float:
+    return since_s if math.isfinite(since_s) else now_s
 
 
 __all__ = ["SightingError", "TargetTracking"]

@@ -31,10 +31,7 @@ class MetricDescentLaw:
     unsigned = True
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
-        half_play = np.array(
-            [0.5 * (joint.servo.dead_band_rad + joint.servo.backlash_rad) for _, joint in rig.joints.items()]
-        )
-        self._inverse = ServoInverse(half_play, parameters.hold_tolerance_rad, parameters.dead_band_trust)
+        self._inverse = ServoInverse(rig, parameters.hold_tolerance_rad, parameters.dead_band_trust)
         self._widest_rad = 2.0 * math.atan(0.5 * rig.baseline_m / _NEAREST_M)
         self._floor_rad = rig.minimum_vergence_rad
         self._good = parameters.contrast_enter

@@ -19,10 +19,7 @@ class PredictiveLaw:
     unsigned = False
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
-        half_play = np.array(
-            [0.5 * (joint.servo.dead_band_rad + joint.servo.backlash_rad) for _, joint in rig.joints.items()]
-        )
-        self._inverse = ServoInverse(half_play, parameters.hold_tolerance_rad, parameters.dead_band_trust)
+        self._inverse = ServoInverse(rig, parameters.hold_tolerance_rad, parameters.dead_band_trust)
 
     def reset(self) -> None:
         """Forget which way the joints came."""

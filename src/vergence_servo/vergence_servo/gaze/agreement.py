@@ -1,0 +1,134 @@
+"""Whether those who tell the target's vergence agree: the fovea, the class-free tracker and the boxes.
+
+The tracker and the boxes follow the target itself, the fovea tells of whatever lies there: past a small target it sees
+the background. Boxes know what the target is, so where they are present they decide who is right.
+"""
+
+import math
+from collections import deque
+
+_SAME_PAIR_S = 0.012
+_FRESH_S = 0.5
+_ENOUGH_PAIRS = 5
+_MEMORY = 0.7
+_SMOOTHED = math.sqrt((1.0 - _MEMORY) / (1.0 + _MEMORY))
+_SURE = 3.0
+_ALWAYS_RAD = 0.003
+
+
+class Agreement:
+    """Compares vergences [rad] of the same pairs. `own_depth_rad` is what the object's own depth explains."""
+
+    def __init__(self, disagreement_rad: float) -> None:
+        self._disagreement_rad = disagreement_rad
+        self.clear()
+
+    def clear(self) -> None:
+        """Nothing has been compared."""
+        self._fovea: deque[tuple[float, float]] = deque(maxlen=30)
+        self._track: deque[tuple[float, float]] = deque(maxlen=30)
+        self._track_own_depth_rad = 0.0
+        self._box_s, self._box_rad, self._box_sigma_rad, self._box_own_depth_rad = -math.inf, math.nan, 0.0, 0.0
+        self._fovea_off, self._track_off = _Mean(), _Mean()
+        self._differing = 0
+
+    @property
+    def disagreement(self) -> bool:
+        """True while two estimators differ by more than the object's own depth explains, and no box decides."""
+        return self._differing >= _ENOUGH_PAIRS
+
+    @property
+    def doubtful(self) -> bool:
+        """True if estimators have just differed, though not for long enough to call it a disagreement."""
+        return self._differing > 0
+
+    def track_is_fresh(self, stamp_s: float, within_s: float) -> bool:
+        """Tell whether the tracker has told a vergence lately."""
+        return bool(self._track) and stamp_s - self._track[-1][0] < within_s
+
+    def see_track(self, stamp_s: float, vergence_rad: float, own_depth_rad: float) -> None:
+        """Take the tracker's vergence of a pair."""
+        self._track.append((stamp_s, vergence_rad))
+        self._track_own_depth_rad = own_depth_rad
+
+    def drop_track(self) -> None:
+        """The tracker is not heeded any more."""
+        self._track.clear()
+        self._track_off, self._differing = _Mean(), 0
+
+    def see_fovea(self, stamp_s: float, vergence_rad: float) -> None:
+        """Take the fovea's vergence of a pair, and hold it against the tracker's of the same pair."""
+        self._fovea.append((stamp_s, vergence_rad))
+        if not self._track or abs(self._track[-1][0] - stamp_s) > 1e-6:
+            if not self.track_is_fresh(stamp_s, _FRESH_S):
+                self._differing = 0
+            return
+        if abs(vergence_rad - self._track[-1][1]) <= self._disagreement_rad + self._track_own_depth_rad:
+            self._differing = max(self._differing - 2, 0)
+        elif self._boxes_are_fresh(stamp_s) and self.fovea_is_astray(stamp_s) != self.track_is_astray(stamp_s):
+            self._differing = 0
+        else:
+            self._differing = min(self._differing + 1, 2 * _ENOUGH_PAIRS)
+
+    def see_box(self, stamp_s: float, vergence_rad: float, sigma_rad: float, own_depth_rad: float) -> None:
+        """Take the boxes' vergence of a pair; boxes are slow, so that the others' of that pair are known by then."""
+        if not math.isfinite(vergence_rad):
+            return
+        if not self._boxes_are_fresh(stamp_s):
+            self._fovea_off, self._track_off = _Mean(), _Mean()
+        self._box_s, self._box_rad = max(stamp_s, self._box_s), vergence_rad
+        self._box_sigma_rad, self._box_own_depth_rad = sigma_rad, own_depth_rad
+        self._fovea_off.take(vergence_rad, self._fovea, stamp_s)
+        self._track_off.take(vergence_rad, self._track, stamp_s)
+
+    def fovea_is_astray(self, stamp_s: float) -> bool:
+        """Tell whether the boxes say that the fovea looks past the target."""
+        return self._boxes_are_fresh(stamp_s) and self._fovea_off.beyond(self._box_own_depth_rad, self._box_sigma_rad)
+
+    def track_is_astray(self, stamp_s: float) -> bool:
+        """Tell whether the boxes say that the tracker follows something else."""
+        return self._boxes_are_fresh(stamp_s) and self._track_off.beyond(self._box_own_depth_rad, self._box_sigma_rad)
+
+    def fovea_may_be_the_target(self, stamp_s: float, vergence_rad: float) -> bool:
+        """Tell whether this vergence at the fovea may be the target's, by all that boxes have said."""
+        if not self._boxes_are_fresh(stamp_s):
+            return True
+        if self._fovea_off.count >= 2:
+            return not self._fovea_off.beyond(self._box_own_depth_rad, self._box_sigma_rad)
+        bound_rad = self._box_own_depth_rad + _ALWAYS_RAD + _SURE * self._box_sigma_rad
+        return abs(vergence_rad - self._box_rad) <= bound_rad
+
+    @property
+    def fovea_off_rad(self) -> float:
+        """How far the fovea's vergence is from the boxes', on average; 0 while nothing could be compared."""
+        return self._fovea_off.value_rad
+
+    @property
+    def track_off_rad(self) -> float:
+        """As `fovea_off_rad`, of the tracker."""
+        return self._track_off.value_rad
+
+    def _boxes_are_fresh(self, stamp_s: float) -> bool:
+        return stamp_s - self._box_s < _FRESH_S
+
+
+class _Mean:
+    """A fading mean of how far another estimator is from the boxes, over pairs that both have seen."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.value_rad = 0.0
+
+    def take(self, box_rad: float, others: deque[tuple[float, float]], stamp_s: float) -> None:
+        same = [value for other_s, value in others if abs(other_s - stamp_s) < _SAME_PAIR_S]
+        if not same:
+            return
+        self.count += 1
+        share = max(1.0 - _MEMORY, 1.0 / self.count)
+        self.value_rad += share * (same[-1] - box_rad - self.value_rad)
+
+    def beyond(self, own_depth_rad: float, sigma_rad: float) -> bool:
+        if self.count < 2:
+            return False
+        spread_rad = sigma_rad * max(_SMOOTHED, 1.0 / math.sqrt(self.count))
+        return abs(self.value_rad) > own_depth_rad + _ALWAYS_RAD + _SURE * spread_rad

@@ -1,0 +1,83 @@
+"""What the target is followed by once it has been given: which track, which boxes, and how far beside them it lies.
+
+What was asked for may lie beside the middle of what is tracked or detected; that offset is kept.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_servo.gaze.target_filter import TargetEstimate
+
+Array = npt.NDArray[np.float64]
+
+_SURE = 4.0
+_BOX_MARGIN_RAD = 0.01
+_LONGEST_MEAN = 8
+
+
+class TrackLock:
+    """The one track that is the target's."""
+
+    def __init__(self) -> None:
+        self.track_id: int | None = None
+        self.offset = (0.0, 0.0)
+        self._refused_id: int | None = None
+
+    def refuse(self) -> None:
+        """The track is something else's: do not take it again."""
+        self._refused_id, self.track_id = self.track_id, None
+
+    def adopt(
+        self,
+        track_id: int,
+        offset: tuple[float, float],
+        vergence_off_rad: float,
+        estimate: TargetEstimate,
+        radius_rad: float,
+        depth_margin_rad: float,
+    ) -> str:
+        """Take a track `offset` (pan, tilt) [rad] beside the target for its own; return why not, or nothing."""
+        distance = math.hypot(*offset)
+        if track_id == self._refused_id:
+            return "the tracker follows something that the boxes say is not the target"
+        if distance > radius_rad:
+            return f"the tracker follows something {math.degrees(distance):.1f} deg away"
+        if abs(vergence_off_rad) > _SURE * float(estimate.sigmas_rad[1]) + depth_margin_rad:
+            return f"the tracker follows something {math.degrees(vergence_off_rad):.1f} deg nearer or farther"
+        # The first lock after a click keeps the click. A tracker that did not lock anew because the move was small
+        # still follows its old target next to it.
+        self.offset = offset if self.track_id is None else (0.0, 0.0)
+        self.track_id = track_id
+        return ""
+
+
+class BoxLock:
+    """The boxes that are the target's although another thing than a class was asked for: those that contain it."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.offset = np.zeros(2)
+
+    def lose(self) -> None:
+        """The boxes are something else's."""
+        self.count, self.offset = 0, np.zeros(2)
+
+    def adopt(self, seen_rad: Array, extent_rad: float, vergence_bound_rad: float, estimate: TargetEstimate) -> bool:
+        """Tell whether boxes with middles at `seen_rad` (left pan, right pan, tilt) are the target's; learn the offset.
+
+        A single box is as wide as high, for all that is known.
+        """
+        off = estimate.joints_rad - seen_rad
+        pan_off = off[0] if math.isfinite(off[0]) else off[1]
+        beside = np.array([pan_off, off[2]])
+        half = 0.5 * min(max(extent_rad, 0.0), 1.0) if math.isfinite(extent_rad) else 0.0
+        sigma = float(max(estimate.sigmas_rad[0], estimate.sigmas_rad[2]))
+        deeper = abs(float(off[1] - off[0]))
+        if not np.abs(beside).max() <= half + _BOX_MARGIN_RAD + min(sigma, half) or deeper > vergence_bound_rad:
+            self.lose()
+            return False
+        self.count = min(self.count + 1, _LONGEST_MEAN)
+        self.offset = self.offset + (beside - self.offset) / self.count
+        return True

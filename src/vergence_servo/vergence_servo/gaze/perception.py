@@ -1,0 +1,184 @@
+"""What the controller knows: observations in, joints, target and verdict out. It commands nothing."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.rig import Rig
+from vergence_servo.gaze.distance import UNKNOWN, TargetPosition, joint_variances, target_position
+from vergence_servo.gaze.joint_history import JointHistory
+from vergence_servo.gaze.joint_moves import JointMoves
+from vergence_servo.gaze.judge import VergedJudge
+from vergence_servo.gaze.laws import Contrast, Law
+from vergence_servo.gaze.observations import (
+    BoxSighting,
+    EdgeJudgement,
+    EyeRotationReading,
+    FoveaDisparity,
+    JointReport,
+    Observation,
+    PointSighting,
+    TrackSighting,
+)
+from vergence_servo.gaze.parameters import GazeParameters
+from vergence_servo.gaze.resolution import pulse_steps_rad
+from vergence_servo.gaze.target_filter import TargetEstimate
+from vergence_servo.gaze.tracking import SightingError, TargetTracking
+from vergence_servo.gaze.vergence_offset import VergenceOffset, farthest_offset_rad
+
+Array = npt.NDArray[np.float64]
+Driven = npt.NDArray[np.bool_]
+
+LATEST_FUTURE_S = 1.0
+_STEADY_VERGENCE_RAD = 0.005
+_SWEEPING_RAD_S = 0.6
+_STILL_SPEED_RAD_S = 0.2
+_ARRIVED_RAD = 0.004
+
+
+class Perception:
+    """The joints' history, the target's tracking, the judge, and what the visual encoder has told."""
+
+    def __init__(self, rig: Rig, parameters: GazeParameters, driven: Driven) -> None:
+        self._rig, self._described_steps_rad = rig, pulse_steps_rad(rig)
+        self.history = JointHistory(rig)
+        self.image_s = -math.inf
+        self.pair_s = math.nan
+        self.contrast: Contrast | None = None
+        self._set_servos(rig)
+        self.set(parameters, driven)
+
+    def set(self, parameters: GazeParameters, driven: Driven) -> None:
+        """Begin anew under other parameters; `driven` (3,) says which joints may move."""
+        self._p, self._driven = parameters, driven
+        self._moves = JointMoves(self._rig, self.history)
+        self.tracking = TargetTracking(self._rig, parameters, self.history, self._moves)
+        self.judge = VergedJudge(parameters)
+        self.judge.unresolved_rad = self._unresolved_rad
+
+    def set_rig(self, rig: Rig) -> None:
+        """Take a rig whose servos have other steps; target and goal stay."""
+        self._set_servos(rig)
+        self._moves.steps_rad = pulse_steps_rad(rig)
+        self.judge.unresolved_rad = self._unresolved_rad
+
+    def _set_servos(self, rig: Rig) -> None:
+        self._rig = rig
+        self._shaft_variances = joint_variances(rig)
+        self.vergence_offset = VergenceOffset(self._shaft_variances, farthest_offset_rad(rig))
+        coarser = np.maximum(pulse_steps_rad(rig) - self._described_steps_rad, 0.0)
+        self._unresolved_rad = 0.5 * float(coarser[0] + coarser[1])
+
+    def forget(self) -> None:
+        """The clock was set back: no stamp means anything any more."""
+        self.history.forget()
+        self.image_s, self.contrast = -math.inf, None
+
+    def take(self, observation: Observation, now_s: float, law: Law, verging: bool) -> None:
+        """Take one observation; `verging` tells whether the eyes may now be called verged."""
+        if isinstance(observation, JointReport):
+            if self.history.add(observation.stamp_s, observation.positions_rad) and self._moves.note():
+                self.vergence_offset.moved(observation.stamp_s)
+            return
+        if not self.history.known or not observation.stamp_s <= now_s + LATEST_FUTURE_S:
+            return
+        if isinstance(observation, EyeRotationReading):
+            self._see_rotation(observation)
+            return
+        if not isinstance(observation, PointSighting):
+            self.image_s = now_s
+        if isinstance(observation, EdgeJudgement):
+            self._see_contrast(observation, now_s, law, verging)
+            return
+        try:
+            believed = self._see(observation, now_s)
+        except SightingError as error:
+            self.tracking.note = str(error)
+            return
+        if believed:
+            self.pair_s = observation.stamp_s
+            if not law.unsigned:
+                self._judge_pair(observation.stamp_s, now_s, verging)
+
+    def estimate(self, time_s: float) -> TargetEstimate | None:
+        """Return the target at `time_s`, or None."""
+        return self.tracking.estimate(time_s)
+
+    def position(self, estimate: TargetEstimate | None) -> TargetPosition:
+        """Return where the target is, and how sure that is."""
+        if estimate is None:
+            return UNKNOWN
+        return target_position(estimate, self._rig, self._shaft_variances, self.vergence_offset)
+
+    def unseen_s(self, now_s: float) -> float:
+        """Return for how long images came in which the target was not seen; inf before it ever was.
+
+        While no image results come at all there is nothing to be lost in: a starved graph is late, not blind.
+        """
+        seen_s = self.tracking.seen_s
+        if not math.isfinite(seen_s):
+            return math.inf
+        images_come = now_s - self.image_s < self._p.no_images_s
+        return max(0.0, (self.image_s if images_come else now_s) - seen_s)
+
+    def eyes_still(self, now_s: float, command_rad: Array) -> bool:
+        """Tell whether the joints rest where they were commanded (3,)."""
+        slow = self.history.speed_within(self.history.newest_s - 0.015, now_s) < _STILL_SPEED_RAD_S
+        return slow and self.off_rad(command_rad) < _ARRIVED_RAD
+
+    def at(self, joints_rad: Array) -> bool:
+        """Tell whether the joints are reported at these angles (3,); NaN asks nothing of its joint."""
+        return self.off_rad(joints_rad) < _ARRIVED_RAD
+
+    def off_rad(self, joints_rad: Array) -> float:
+        """Return how far the farthest joint is reported from these angles (3,) [rad], NaN left out."""
+        off = np.abs(self.history.reported_rad - joints_rad)
+        return float(np.where(np.isfinite(off), off, 0.0).max())
+
+    def _see(self, observation: Observation, now_s: float) -> bool:
+        if isinstance(observation, PointSighting):
+            return self.tracking.see_point(observation, now_s)
+        if isinstance(observation, TrackSighting):
+            return self.tracking.see_track(observation, now_s)
+        if isinstance(observation, BoxSighting):
+            return self.tracking.see_box(observation, now_s)
+        return isinstance(observation, FoveaDisparity) and self.tracking.see_fovea(observation, now_s)
+
+    def _see_rotation(self, seen: EyeRotationReading) -> None:
+        if seen.usable and self.tracking.eyes_were_still(seen.stamp_s, seen.skew_s):
+            left, right, _ = self.history.shaft_at(seen.stamp_s)
+            self.vergence_offset.see(seen.stamp_s, seen.vergence_rad - float(right - left), seen.sigma_rad)
+
+    def _see_contrast(self, seen: EdgeJudgement, now_s: float, law: Law, verging: bool) -> None:
+        self.judge.see_contrast(seen.stamp_s, seen.contrast, seen.verged)
+        if not (math.isfinite(seen.stamp_s) and self.history.covers(seen.stamp_s)):
+            return
+        if self.contrast is not None and seen.stamp_s <= self.contrast.stamp_s:
+            return
+        joints = self.history.shaft_at(seen.stamp_s)
+        resting = self.tracking.eyes_were_still(seen.stamp_s, 0.0)
+        self.contrast = Contrast(seen.stamp_s, seen.contrast, seen.metric_px, float(joints[1] - joints[0]), resting)
+        if law.unsigned and resting and self.tracking.filter.initialised:
+            self.judge.see_pair(seen.stamp_s, now_s, law.remaining_rad(), True, verging)
+
+    def _judge_pair(self, stamp_s: float, now_s: float, verging: bool) -> None:
+        visual, by_point = self.tracking.visual, self.tracking.source == "point"
+        if by_point:
+            stamp_s = self.judge.exposure_for(stamp_s, now_s)
+        estimate = self.tracking.estimate(stamp_s)
+        if visual is None or estimate is None:
+            return
+        joints = self.history.shaft_at(stamp_s)
+        errors = estimate.joints_rad - joints if by_point else visual.error_rad
+        # With an eye held there is no version to correct: what is left is vergence, and the tilt.
+        judged = range(3) if self._driven[:2].all() else (2,)
+        measured = [abs(float(errors[i])) for i in judged if self._driven[i]]
+        vergence_error = estimate.vergence_rad - float(joints[1] - joints[0])
+        error = max([abs(vergence_error), *(value for value in measured if math.isfinite(value))])
+        # Eyes that sweep across the target are not verged on it; eyes that go along with it are.
+        along = float(np.abs(estimate.rates_rad_s).max()) if estimate.moving else 0.0
+        sweeping = self.history.speed_within(stamp_s - 0.03, stamp_s) > along + _SWEEPING_RAD_S
+        certain = float(estimate.sigmas_rad[1]) < _STEADY_VERGENCE_RAD
+        steady = certain and not sweeping and not self.tracking.doubtful
+        self.judge.see_pair(stamp_s, now_s, error, steady, verging)
