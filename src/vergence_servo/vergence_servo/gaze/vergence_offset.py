@@ -10,7 +10,7 @@ from vergence_rig.rig import Rig
 Array = npt.NDArray[np.float64]
 
 _GATE = 3.0
-_COMMON_SHARE = 0.7
+_COMMON_SHARE = 0.9
 """Of an encoder's variance, what its readings of one rest have in common: the same features through the same lenses."""
 _MOUNT_TOLERANCE_RAD = 0.0175
 _WORST_SIGMA_RAD = 0.1
