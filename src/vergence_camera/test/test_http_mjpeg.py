@@ -20,6 +20,7 @@ from vergence_camera.errors import (
     WrongSizeError,
 )
 from vergence_camera.frame import Frame, ModeRequest
+from vergence_camera.sources.http_client import shown_url
 from vergence_camera.sources.http_mjpeg import HttpMjpegSource
 from vergence_camera.sources.multipart import MultipartParser, boundary_of
 
@@ -255,6 +256,18 @@ def test_redirects_and_passwords(http_server: Serve, make_jpeg: Make) -> None:
     source.open()
     assert f"Basic {base64.b64encode(b'user:p@ss').decode()}" in camera.requests[0]
     assert "p%40ss" not in source_of(secret).identity
+
+
+@pytest.mark.parametrize(
+    ("url", "shown"),
+    [
+        ("http://user:p%40ss@host:80/a@b", "http://host:80/a@b"),
+        ("rtsp://me:secret@10.0.0.2", "rtsp://10.0.0.2"),
+        ("http://host/stream?x=1", "http://host/stream?x=1"),
+    ],
+)
+def test_addresses_are_shown_without_their_secrets(url: str, shown: str) -> None:
+    assert shown_url(url) == shown
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,8 @@ import numpy as np
 
 from vergence_camera.errors import CameraError, DisconnectedError, ModeMismatchError, WrongSizeError
 from vergence_camera.frame import Clock, Encoding, Frame, Mode, ModeRequest
-from vergence_camera.v4l2.structures import fourcc_text
+from vergence_camera.sources.asked_mode import check_asked, mode_of, size_alone
+from vergence_camera.sources.http_client import shown_url
 
 
 class DecodedStreamSource:
@@ -27,8 +28,7 @@ class DecodedStreamSource:
     @property
     def identity(self) -> str:
         """See FrameSource."""
-        scheme, _, rest = self._url.partition("://")
-        return f"{scheme}://{rest.rpartition('@')[2]}"
+        return shown_url(self._url)
 
     def open(self) -> Mode:
         """See FrameSource."""
@@ -42,17 +42,12 @@ class DecodedStreamSource:
             capture.release()
             raise DisconnectedError(f"{self.identity}: cannot be opened within {self._open_timeout_s:g} s, or decoded")
         self._capture = capture
-        rate_hz = float(capture.get(cv2.CAP_PROP_FPS))
-        self._mode = Mode(
-            fourcc_text(int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).strip("\0").upper() or "?",
-            int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)),
-            int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)),
-            rate_hz if 0.0 < rate_hz <= 1000.0 else 0.0,
-        )
-        size = ModeRequest("", self._request.width_px, self._request.height_px)
-        if size.hard_mismatch(self._mode):
+        self._mode = mode_of(capture)
+        try:
+            check_asked(size_alone(self._request), self._mode, self.identity, "stream")
+        except ModeMismatchError:
             self.close()
-            raise ModeMismatchError(f"{self.identity}: asked for {size}, the stream is {self._mode}")
+            raise
         return self._mode
 
     def read(self, timeout_s: float) -> Frame | None:

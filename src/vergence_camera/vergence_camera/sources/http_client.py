@@ -36,7 +36,7 @@ class HttpStream:
             self.close()
         if status != 200:
             self.close()
-            reason = f"{_shown(url)}: the server answers {status}"
+            reason = f"{shown_url(url)}: the server answers {status}"
             if status in (401, 403):
                 raise PermissionDeniedError(f"{reason}: it wants a user and password (http://user:password@host/...)")
             raise DisconnectedError(reason)
@@ -92,7 +92,7 @@ class HttpStream:
     def _request(self, url: str) -> int:
         parts = urlsplit(url)
         if parts.scheme not in ("http", "https") or not parts.hostname:
-            raise UnsupportedError(f"{_shown(url)}: is no http or https address")
+            raise UnsupportedError(f"{shown_url(url)}: is no http or https address")
         secure = parts.scheme == "https"
         address = (parts.hostname, parts.port or (443 if secure else 80))
         target = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
@@ -110,7 +110,7 @@ class HttpStream:
             self.close()
             if isinstance(error, DisconnectedError):
                 raise
-            raise DisconnectedError(f"{_shown(url)}: cannot be reached: {error.strerror or error}") from error
+            raise DisconnectedError(f"{shown_url(url)}: cannot be reached: {error.strerror or error}") from error
 
     def _read_head(self, url: str) -> int:
         assert self._socket is not None
@@ -121,7 +121,7 @@ class HttpStream:
             data = self._socket.recv(4096)
             received += data
             if not data or len(received) > _LONGEST_HEADER:
-                raise DisconnectedError(f"{_shown(url)}: the server sends no HTTP header")
+                raise DisconnectedError(f"{shown_url(url)}: the server sends no HTTP header")
         self._body = received[end + 4 :]
         status_line, *lines = received[:end].decode("latin-1").split("\r\n")
         pairs = (line.partition(":") for line in lines)
@@ -129,7 +129,7 @@ class HttpStream:
         self._chunks = _Dechunker() if "chunked" in self.headers.get("transfer-encoding", "").lower() else None
         words = status_line.split()
         if len(words) < 2 or not words[0].startswith("HTTP/") or not words[1].isdigit():
-            raise DisconnectedError(f"{_shown(url)}: the server does not speak HTTP")
+            raise DisconnectedError(f"{shown_url(url)}: the server does not speak HTTP")
         return int(words[1])
 
 
@@ -168,7 +168,8 @@ class _Dechunker:
         return bytes(body)
 
 
-def _shown(url: str) -> str:
-    """Return the address without its password."""
-    parts = urlsplit(url)
-    return parts._replace(netloc=parts.netloc.rpartition("@")[2]).geturl()
+def shown_url(url: str) -> str:
+    """Return the address without its user and password."""
+    scheme, _, rest = url.partition("://")
+    host, slash, path = rest.partition("/")
+    return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"

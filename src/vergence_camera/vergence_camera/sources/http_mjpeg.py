@@ -3,10 +3,11 @@
 import contextlib
 import time
 
-from vergence_camera.errors import CameraError, DisconnectedError, ModeMismatchError, WrongSizeError
+from vergence_camera.errors import CameraError, DisconnectedError, WrongSizeError
 from vergence_camera.frame import Clock, Encoding, Frame, Mode, ModeRequest
 from vergence_camera.jpeg import JpegInfo, inspect_jpeg
-from vergence_camera.sources.http_client import HttpStream
+from vergence_camera.sources.asked_mode import check_asked
+from vergence_camera.sources.http_client import HttpStream, shown_url
 from vergence_camera.sources.multipart import MultipartParser, Part, boundary_of
 
 
@@ -29,8 +30,7 @@ class HttpMjpegSource:
     @property
     def identity(self) -> str:
         """See FrameSource."""
-        scheme, _, rest = self._url.partition("://")
-        return f"{scheme}://{rest.rpartition('@')[2]}"
+        return shown_url(self._url)
 
     def open(self) -> Mode:
         """See FrameSource. The size is that of the first whole picture."""
@@ -43,13 +43,11 @@ class HttpMjpegSource:
             except CameraError as error:
                 raise type(error)(f"{self.identity}: {error}") from None
             first = self._first_picture(deadline)
+            self._mode = Mode("MJPG", first.width_px, first.height_px, 0.0)
+            check_asked(self._request, self._mode, self.identity, "stream")
         except BaseException:
             self.close()
             raise
-        self._mode = Mode("MJPG", first.width_px, first.height_px, 0.0)
-        if self._request.hard_mismatch(self._mode):
-            self.close()
-            raise ModeMismatchError(f"{self.identity}: asked for {self._request}, the stream is {self._mode}")
         return self._mode
 
     def read(self, timeout_s: float) -> Frame | None:

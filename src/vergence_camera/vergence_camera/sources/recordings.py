@@ -10,9 +10,9 @@ import numpy as np
 from vergence_camera.errors import CorruptFrameError, FileMissingError, TruncatedFileError, UnsupportedError
 from vergence_camera.frame import Mode, Pixels
 from vergence_camera.jpeg import inspect_jpeg
+from vergence_camera.sources.asked_mode import mode_of
 from vergence_camera.sources.avi_demuxer import frames, is_avi, read_header
 from vergence_camera.sources.replay import Picture, Recording
-from vergence_camera.v4l2.structures import fourcc_text
 
 PICTURE_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"}
 _JPEG_SUFFIXES = {".jpg", ".jpeg"}
@@ -58,12 +58,9 @@ class VideoRecording:
         """See Recording."""
         capture = self._open()
         try:
-            code = fourcc_text(int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).strip("\0").upper()
-            width, height = int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
-            rate_hz = float(capture.get(cv2.CAP_PROP_FPS))
+            return mode_of(capture)
         finally:
             capture.release()
-        return Mode(code or "?", width, height, rate_hz if 0.0 < rate_hz <= 1000.0 else 0.0)
 
     def pictures(self) -> Iterator[Picture]:
         """See Recording. A file that claims more frames than can be decoded is reported as truncated."""

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from vergence_camera.errors import CorruptFrameError, ModeMismatchError, ReplayEndedError, TruncatedFileError
+from vergence_camera.errors import CorruptFrameError, ReplayEndedError, TruncatedFileError
 from vergence_camera.frame import Clock, Encoding, Frame, Mode, ModeRequest, Pixels
 from vergence_camera.jpeg import inspect_jpeg
+from vergence_camera.sources.asked_mode import check_asked, size_alone
 
 
 @dataclass(frozen=True)
@@ -73,9 +74,7 @@ class Replay:
         found = self._recording.mode()
         rate = self._asked_rate_hz or found.rate_hz or self._default_rate_hz
         self._mode = Mode(found.pixel_format, found.width_px, found.height_px, rate)
-        size = ModeRequest("", self._request.width_px, self._request.height_px)
-        if size.hard_mismatch(self._mode):
-            raise ModeMismatchError(f"{self.identity}: asked for {size}, the recording is {self._mode}")
+        check_asked(size_alone(self._request), self._mode, self.identity, "recording")
         self._pictures = self._recording.pictures()
         self._due_ns = self._now_ns()
         return self._mode

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vergence_rig.parameters import Parameters, parameter
+from vergence_servo.drivers.channels_in_use import ChannelsInUse
 from vergence_servo.drivers.protocol import ChannelError, DriverIoError, DriverUnavailableError
 
 _CHANNELS = 16
@@ -41,7 +42,7 @@ class Pca9685Driver:
         except ImportError as error:
             raise DriverUnavailableError(f"backend 'pca9685': {error}: {_PACKAGE}") from error
         self._chip = _open(PCA9685, _board_bus() if bus is None else bus, values)
-        self._used: set[int] = set()
+        self._channels = ChannelsInUse(self._write)
         # What the chip really does: its prescaler is a whole number.
         self.resolution_us = (int(self._chip.prescale_reg) + 1) / values.oscillator_hz * 1e6
 
@@ -50,22 +51,16 @@ class Pca9685Driver:
         ticks = round(pulse_us / self.resolution_us)
         if not 0 < ticks < _TICKS:
             raise DriverIoError(errno.EINVAL, f"pulse of {pulse_us} us is {ticks} ticks: allowed is 1 to {_TICKS - 1}")
-        self._write(channel, ticks)
-        self._used.add(channel)
+        self._channels.set(channel, ticks)
         return ticks * self.resolution_us
 
     def release(self, channel: int) -> None:
         """See ServoDriver; sets the chip's full-off bit."""
-        self._write(channel, 0)
-        self._used.discard(channel)
+        self._channels.set(channel, 0)
 
     def close(self) -> None:
-        """See ServoDriver. The chip's other channels are left alone."""
-        for channel in tuple(self._used):
-            try:
-                self.release(channel)
-            except DriverIoError:
-                continue  # the bus is gone: only OE can stop the chip now
+        """See ServoDriver. The chip's other channels are left alone; where the bus is gone, only OE can stop them."""
+        self._channels.release_all()
 
     def _write(self, channel: int, ticks: int) -> None:
         if not 0 <= channel < _CHANNELS:

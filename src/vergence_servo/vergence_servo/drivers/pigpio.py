@@ -11,6 +11,7 @@ import struct
 from dataclasses import dataclass
 
 from vergence_rig.parameters import Parameters, parameter
+from vergence_servo.drivers.channels_in_use import ChannelsInUse
 from vergence_servo.drivers.protocol import ChannelError, DriverIoError, DriverUnavailableError
 
 _SERVO, _REAL_RANGE, _FREQUENCY, _VERSION = 8, 24, 23, 26
@@ -41,7 +42,7 @@ class PigpioDriver:
     def __init__(self, parameters: PigpioParameters | None = None) -> None:
         self._values = parameters or PigpioParameters()
         self._socket: socket.socket | None = None
-        self._used: set[int] = set()
+        self._channels = ChannelsInUse(lambda gpio, width_us: self._request(_SERVO, _checked(gpio), width_us))
         try:
             self._request(_VERSION, 0, 0)
             frequency_hz, real_range = self._request(_FREQUENCY, 4, 0), self._request(_REAL_RANGE, 4, 0)
@@ -56,28 +57,17 @@ class PigpioDriver:
         width_us = round(round(pulse_us / self.resolution_us) * self.resolution_us)
         if width_us <= 0:
             raise DriverIoError(errno.EINVAL, f"pulse is {pulse_us} us: allowed is more than 0")
-        self._request(_SERVO, self._gpio(channel), width_us)
-        self._used.add(channel)
+        self._channels.set(channel, width_us)
         return float(width_us)
 
     def release(self, channel: int) -> None:
         """See ServoDriver."""
-        self._request(_SERVO, self._gpio(channel), 0)
-        self._used.discard(channel)
+        self._channels.set(channel, 0)
 
     def close(self) -> None:
         """See ServoDriver."""
-        for channel in tuple(self._used):
-            try:
-                self.release(channel)
-            except DriverIoError:
-                break  # no daemon to tell
+        self._channels.release_all()
         self._disconnect()
-
-    def _gpio(self, channel: int) -> int:
-        if not 0 <= channel <= _LAST_GPIO:
-            raise ChannelError(f"channel is {channel}: allowed is a GPIO number, 0 to {_LAST_GPIO} (backend 'pigpio')")
-        return channel
 
     def _request(self, command: int, first: int, second: int) -> int:
         try:
@@ -108,3 +98,9 @@ class PigpioDriver:
         if self._socket is not None:
             self._socket.close()
             self._socket = None
+
+
+def _checked(gpio: int) -> int:
+    if not 0 <= gpio <= _LAST_GPIO:
+        raise ChannelError(f"channel is {gpio}: allowed is a GPIO number, 0 to {_LAST_GPIO} (backend 'pigpio')")
+    return gpio
