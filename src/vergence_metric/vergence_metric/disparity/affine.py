@@ -31,6 +31,7 @@ _SHEAR_FROM_PX = 8.0
 _REACH_PX = 24  # that a warped window may reach beyond its own size
 _FLOOR_PX = 0.01  # interpolation, and what no residual shows
 _BLOCK_PX = 7
+_MIXED_PX = 0.07  # what the model misses of surfaces that end or bend within sight, by scenes of the simulator
 _DRIFT_SHARE = 0.7  # what an answer moves by when its window grows, noise does not explain
 _PRIOR_SHEAR = 0.1  # standard deviation of slant and roll between the eyes
 _PRIOR_VERTICAL_PX = 1.0
@@ -68,11 +69,13 @@ def grow(
     best: Fit | None = None
     for sigma in [w for w in parameters.disparity_windows_px if w >= window_px]:
         fit = fit_affine(blurred[0], blurred[1], pair.point_px, sigma, warp)
-        if fit is None or abs(fit.horizontal_px - horizontal_px) > _LARGEST_STEP_PX:
-            break
         # The same surface leaves the same residual; another depth in view raises it.
-        if best is not None and fit.residual > 1.25 * best.residual + 0.5:
-            break
+        if (
+            fit is None
+            or abs(fit.horizontal_px - horizontal_px) > _LARGEST_STEP_PX
+            or (best is not None and fit.residual > 1.25 * best.residual + 0.5)
+        ):
+            return best and replace(best, sigma_px=math.hypot(best.sigma_px, _MIXED_PX))
         if best is not None:
             drift_px = _DRIFT_SHARE * (fit.horizontal_px - best.horizontal_px)
             fit = replace(fit, sigma_px=math.hypot(fit.sigma_px, drift_px))
