@@ -9,11 +9,13 @@ at most the slop apart (inclusive). It is given out as soon as no later frame ca
   cannot come soon enough, by the shortest interval that camera has shown lately, the pair is given out at once; else it
   is waited for, at most a time limit measured in the cameras' period.
 
-So two 30 Hz cameras up to nearly half a period apart pair without waiting. At half a period, within the cameras' jitter,
-nobody can know which frame will be the nearer one: there the wait is inherent, until the earlier camera's next frame is
-here, which takes half a period more; the time limit counts only where that frame is lost. While fewer than four
-intervals of a camera are known every pair of unequal stamps waits so, up to a period less the skew. Each frame is queued once and removed once:
-O(1) amortised. Times are integer nanoseconds. One thread uses a pairer; it holds no lock and calls nobody.
+So two 30 Hz cameras up to nearly half a period apart pair without waiting. At half a period, within the cameras'
+jitter, nobody can know which frame will be the nearer one: there the wait is inherent, until the earlier camera's next
+frame is here, which takes half a period more; the time limit counts only where that frame is lost. While fewer than
+four intervals of a camera are known, every pair of unequal stamps waits so, up to a period less the skew.
+
+Each frame is queued once and removed once: O(1) amortised. Times are integer nanoseconds. One thread uses a pairer; it
+holds no lock and calls nobody.
 """
 
 from collections import deque

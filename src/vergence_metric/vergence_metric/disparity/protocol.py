@@ -32,10 +32,10 @@ class Disparity:
 
     `horizontal_px` is x_left - x_right, `vertical_px` is y_left - y_right of the world point seen at `point_px` (x, y)
     of the left image; positive horizontal means nearer than where the axes cross. `sigma_px` is the standard deviation
-    of the horizontal one as far as image noise and texture explain it. `confidence` is the share of answers with the
-    same evidence that lie within 2 px of the truth (see `evidence.py`). Where `status` is not OK the figures are NaN,
-    except that an OUT_OF_RANGE or AMBIGUOUS answer keeps its best guess for those who log it; its confidence is at
-    most 0.5.
+    of the horizontal one by image noise and texture; that of `affine` also by what its model misses. `confidence` is
+    the share of answers with the same evidence that lie within 2 px of the truth (see `evidence.py`). Where `status`
+    is not OK the figures are NaN, except that an OUT_OF_RANGE or AMBIGUOUS answer keeps its best guess for those who
+    log it; its confidence is at most 0.5.
     """
 
     horizontal_px: float
