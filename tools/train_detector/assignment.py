@@ -61,8 +61,10 @@ def _assigned(
     positive = chosen.any(1)
     taken = torch.zeros_like(chosen).scatter_(1, best[:, None], positive[:, None])
     quality, overlap = quality * taken, overlap * taken
-    scale = overlap.amax(2, keepdim=True) / quality.amax(2, keepdim=True).clamp(min=_TINY)
-    score = (quality * scale).amax(1)  # (B, N): the best cell of an object is asked for its overlap
+    # The best cell of an object is asked for the root of its overlap: the overlap itself would leave small objects,
+    # whose boxes overlap less, with scores that clutter reaches.
+    scale = overlap.amax(2, keepdim=True).sqrt() / quality.amax(2, keepdim=True).clamp(min=_TINY)
+    score = (quality * scale).amax(1)
     score = torch.where(positive, score.clamp(min=0.05), torch.zeros_like(score))
     target_classes = classes.gather(1, best)
     wanted = torch.zeros_like(scores)

@@ -1,4 +1,4 @@
-"""Variation of renders while training: mirrored, shifted, scaled, relit, noisy, blurred."""
+"""Variation of renders while training: parts at any scale, mirrored, relit, noisy, blurred."""
 
 from dataclasses import dataclass
 
@@ -8,74 +8,82 @@ from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
 Boxes = NDArray[np.float32]
-_GREY = (114, 114, 114)
+_SHIPPED_SCALE = 0.5
+_LEAST_SEEN, _LEAST_PX = 0.35, 5.0
 
 
 @dataclass(frozen=True)
 class Strength:
     """How far images are varied; 0 leaves them as they are."""
 
-    geometry: float = 1.0
+    scale: float = 1.0
     colour: float = 1.0
 
 
-def vary(rng: np.random.Generator, image: Image, boxes: Boxes, strength: Strength) -> tuple[Image, Boxes]:
-    """Return a varied copy of an image (h, w, 3) BGR and of its boxes (M, 4), counted from its corner [px].
+def part_of(
+    rng: np.random.Generator,
+    image: Image,
+    boxes: Boxes,
+    alikes: Boxes,
+    size_px: tuple[int, int],
+    strength: Strength,
+) -> tuple[Image, Boxes]:
+    """Return a varied part of a render as the detector would see it, `size_px` (width, height), and the boxes in it.
 
-    Boxes of which less than 60 % stays inside go, with the little that is seen of them left as it is.
+    Args:
+        rng: random numbers.
+        image: (h, w, 3) BGR.
+        boxes: (M, 4) of the objects, counted from the image's corner [px].
+        alikes: (K, 2) places of look-alikes [px].
+        size_px: of the part, in the detector's pixels.
+        strength: how far to vary it. Half of the parts have the scale at which the detector runs on whole images, the
+            others anything from farther away to a second look at full resolution.
+
     """
+    (height, width), smallest = image.shape[:2], max(size_px[0] / image.shape[1], size_px[1] / image.shape[0])
+    scale = _SHIPPED_SCALE
+    if rng.random() < 0.5 * strength.scale:
+        scale = float(np.exp(rng.uniform(np.log(max(smallest, 0.32)), 0.0)))
+    w, h = min(round(size_px[0] / scale), width), min(round(size_px[1] / scale), height)
+    x, y = _corner(rng, (width, height), (w, h), boxes, alikes)
+    picture = np.asarray(cv2.resize(image[y : y + h, x : x + w], size_px, interpolation=cv2.INTER_LINEAR), np.uint8)
+    factor = np.array([size_px[0] / w, size_px[1] / h] * 2, np.float32)
+    inside = (np.clip(boxes - np.array([x, y, x, y], np.float32), 0, [w, h, w, h]) * factor).astype(np.float32)
+    kept = (_share(inside / factor, boxes) >= _LEAST_SEEN) & (
+        (inside[:, 2:] - inside[:, :2]).min(1, initial=np.inf) >= _LEAST_PX
+    )
+    inside = inside[kept]
     if rng.random() < 0.5:
-        image, boxes = (
-            image[:, ::-1],
-            np.stack([image.shape[1] - boxes[:, 2], boxes[:, 1], image.shape[1] - boxes[:, 0], boxes[:, 3]], axis=1),
-        )
-    if strength.geometry and rng.random() < 0.6 * strength.geometry:
-        image, boxes = _moved(rng, image, boxes)
+        picture = picture[:, ::-1]
+        inside = np.stack([size_px[0] - inside[:, 2], inside[:, 1], size_px[0] - inside[:, 0], inside[:, 3]], axis=1)
     if strength.colour:
-        image = _relit(rng, image)
-    return np.ascontiguousarray(image), boxes
+        picture = _relit(rng, picture)
+    return np.ascontiguousarray(picture), inside
 
 
-def crop(rng: np.random.Generator, image: Image, boxes: Boxes, size_px: tuple[int, int]) -> tuple[Image, Boxes]:
-    """Return a part of `size_px` (width, height) of an image and the boxes in it, mostly about one of its objects.
+def _share(inside: Boxes, boxes: Boxes) -> Boxes:
+    area = (inside[:, 2:] - inside[:, :2]).prod(1)
+    return np.asarray(area / np.maximum((boxes[:, 2:] - boxes[:, :2]).prod(1), 1e-6))
 
-    A box of which hardly anything stays inside goes; a place where that is neither all nor nothing is avoided.
-    """
-    (height, width), (w, h) = image.shape[:2], size_px
+
+def _corner(
+    rng: np.random.Generator, image_px: tuple[int, int], part_px: tuple[int, int], boxes: Boxes, alikes: Boxes
+) -> tuple[int, int]:
+    """Choose a part mostly about an object, else about a look-alike; none that shows too little of an object."""
+    whole, part = np.array(image_px), np.array(part_px)
     for _ in range(6):
-        middle = rng.uniform((0, 0), (width, height))
-        if len(boxes) and rng.random() < 0.7:
+        middle, choice = rng.uniform((0, 0), image_px), rng.random()
+        if len(boxes) and choice < 0.6:
             box = boxes[rng.integers(len(boxes))]
-            middle = 0.5 * (box[:2] + box[2:]) + rng.uniform(-0.45, 0.45, 2) * size_px
-        x, y = (
-            int(np.clip(m - s / 2, 0, side - s)) for m, s, side in zip(middle, size_px, (width, height), strict=True)
-        )
-        inside = np.clip(boxes - np.array([x, y, x, y], np.float32), 0, [w, h, w, h]).astype(np.float32)
-        share = (inside[:, 2:] - inside[:, :2]).prod(1) / np.maximum((boxes[:, 2:] - boxes[:, :2]).prod(1), 1e-6)
+            middle = 0.5 * (box[:2] + box[2:]) + rng.uniform(-0.42, 0.42, 2) * part
+        elif len(alikes) and choice < 0.9:
+            middle = alikes[rng.integers(len(alikes))] + rng.uniform(-0.42, 0.42, 2) * part
+        x, y = (int(v) for v in np.clip(middle - part / 2, 0, whole - part))
+        limits = [x, y, x + part_px[0], y + part_px[1]]
+        share = _share(np.clip(boxes, limits[:2] * 2, limits[2:] * 2), boxes)
         if not ((share > 0.03) & (share < 0.5)).any():
             break
-    kept = (share >= 0.35) & ((inside[:, 2:] - inside[:, :2]).min(1, initial=np.inf) >= 4)
-    return np.ascontiguousarray(image[y : y + h, x : x + w]), inside[kept]
-
-
-def _moved(rng: np.random.Generator, image: Image, boxes: Boxes) -> tuple[Image, Boxes]:
-    height, width = image.shape[:2]
-    scale = float(np.exp(rng.uniform(np.log(0.7), np.log(1.5))))
-    dx, dy = rng.uniform(-0.1, 0.1) * width, rng.uniform(-0.1, 0.1) * height
-    x0, y0 = (1 - scale) * width / 2 + dx, (1 - scale) * height / 2 + dy
-    # Boxes count from the image's corner, warpAffine from the first pixel's centre.
-    matrix = np.array([[scale, 0, x0 + 0.5 * scale - 0.5], [0, scale, y0 + 0.5 * scale - 0.5]])
-    flags = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-    moved = cv2.warpAffine(image, matrix, (width, height), flags=flags, borderValue=_GREY)
-    placed = boxes * scale + np.array([x0, y0, x0, y0], np.float32)
-    inside = np.clip(placed, 0, [width, height, width, height]).astype(np.float32)
-    share = (inside[:, 2:] - inside[:, :2]).prod(1) / np.maximum((placed[:, 2:] - placed[:, :2]).prod(1), 1e-6)
-    if ((share < 0.6) & (share > 0.05)).any():
-        return image, boxes
-    kept = (share >= 0.6) & ((inside[:, 2:] - inside[:, :2]).min(1) >= 4)
-    if (~kept & (share > 0.05)).any():
-        return image, boxes
-    return np.asarray(moved, np.uint8), inside[kept]
+    return x, y
 
 
 def _relit(rng: np.random.Generator, image: Image) -> Image:
@@ -84,8 +92,8 @@ def _relit(rng: np.random.Generator, image: Image) -> Image:
     levels = np.arange(256, dtype=np.float32)[:, None] / 255.0
     table = np.clip(255 * levels**gamma * gains.astype(np.float32) + rng.normal(0, 4), 0, 255).astype(np.uint8)
     image = np.asarray(cv2.LUT(np.ascontiguousarray(image), table.reshape(256, 1, 3)))
-    if rng.random() < 0.15:
-        image = np.asarray(cv2.GaussianBlur(image, (0, 0), rng.uniform(0.3, 0.9)))
+    if rng.random() < 0.1:
+        image = np.asarray(cv2.GaussianBlur(image, (0, 0), rng.uniform(0.3, 0.8)))
     if rng.random() < 0.3:
         noise = rng.standard_normal(image.shape, dtype=np.float32) * np.float32(rng.uniform(1, 5))
         image = np.clip(image + noise, 0, 255).astype(np.uint8)

@@ -11,10 +11,12 @@ from tools.train_detector.dataset import Shard
 from vergence_metric.box_parameters import DetectorParameters
 from vergence_metric.boxes import Detector
 
-SMALL_PX = (8.0, 16.0)
+SMALL_PX = (16.0, 32.0)
+"""Widths at 640, 8 to 16 at 320."""
+
 _HARDLY_VISIBLE = 0.5
-_LEAST_PX = 6.0
-_THRESHOLDS = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65)
+_LEAST_PX = 12.0
+_THRESHOLDS = tuple(round(0.2 + 0.025 * i, 3) for i in range(29))
 _FALSE_PER_1000 = 5.0
 
 

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_sim.textures import CUBE_COLOURS_BGR, cloud, collage
+from tools.train_detector.textures import cloud, collage
+from vergence_sim.pictures import CUBE_COLOURS_BGR, cube_faces
 
 Image = NDArray[np.uint8]
 _SIZE_PX = 96
@@ -74,7 +75,7 @@ def _collage(rng: np.random.Generator) -> Image:
     return collage(rng, _SIZE_PX, 25)
 
 
-KINDS: dict[str, Callable[[np.random.Generator], Image]] = {
+PATTERNS: dict[str, Callable[[np.random.Generator], Image]] = {
     "plain": _plain,
     "stripes": _stripes,
     "dots": _dots,
@@ -84,10 +85,31 @@ KINDS: dict[str, Callable[[np.random.Generator], Image]] = {
     "collage": _collage,
 }
 
+PUZZLES = {"puzzle of 2": 2, "puzzle of 4": 4, "puzzle of 5": 5}
+"""Cells a side."""
+
+KINDS = (*PATTERNS, *PUZZLES)
+
+SMALLEST_PX = {
+    "plain": 6.5,
+    "label": 6.5,
+    "dots": 12.0,
+    "checks": 12.0,
+    "stripes": 14.0,
+    "bricks": 16.0,
+    "collage": 16.0,
+    "puzzle of 2": 20.0,
+    "puzzle of 4": 26.0,
+    "puzzle of 5": 30.0,
+}
+"""Width at 320 from which one can tell each from a Rubik's cube: what cannot be seen is not asked for [px]."""
+
 
 def faces(rng: np.random.Generator, kind: str) -> list[Image]:
     """Return six worn faces (n, n, 3) of one kind of look-alike."""
-    make = KINDS[kind]
+    if kind in PUZZLES:
+        return cube_faces(rng, PUZZLES[kind], 128)
+    make = PATTERNS[kind]
     return [
         np.clip(make(rng).astype(np.float32) + cloud(rng, _SIZE_PX, 5, 0.8)[:, :, None] * 6, 0, 255).astype(np.uint8)
         for _ in range(6)

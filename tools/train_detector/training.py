@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from tools.train_detector.assignment import assign
-from tools.train_detector.augmentation import Strength, crop, vary
+from tools.train_detector.augmentation import Strength, part_of
 from tools.train_detector.dataset import INPUT_PX, MOST, Shard
 from tools.train_detector.losses import detection_loss
 from tools.train_detector.network import STRIDES, Detector, cell_centers
@@ -23,10 +23,10 @@ _LOG_EVERY = 50
 
 @dataclass(frozen=True)
 class Schedule:
-    """How long [min of wall time] and how fast; the last `plain_share` sees the renders all but unchanged.
+    """How long [min of wall time] and how fast.
 
     The first `crop_share` of the time goes to crops about the objects: most of a render is background, and a crop
-    costs a third of it.
+    costs a third of it. The rest sees whole renders, the last `plain_share` all but unchanged.
 
     Time, not steps, drives the learning rate: a busy machine trains less, but to the end of its cycle.
     """
@@ -34,12 +34,12 @@ class Schedule:
     minutes: float
     batch: int = 16
     crop_batch: int = 32
-    crop_share: float = 0.75
-    rate: float = 2e-3
+    crop_share: float = 0.85
+    rate: float = 3e-3
     weight_decay: float = 0.02
     warm_up: int = 200
     average: float = 0.999
-    plain_share: float = 0.1
+    plain_share: float = 0.07
     seed: int = 1
 
 
@@ -136,7 +136,7 @@ def _batches(
         order, start = rng.permutation(len(data.images)), 0
         while True:
             plain, cropped = share() >= 1 - schedule.plain_share, share() < schedule.crop_share
-            strength = Strength(0.0, 0.4) if plain else Strength()
+            strength = Strength(0.0, 0.0) if plain else Strength()
             chosen = order[start : start + (schedule.crop_batch if cropped else schedule.batch)]
             start += len(chosen)
             if start >= len(order):
@@ -155,9 +155,9 @@ def _batch(
     images = np.empty((len(chosen), 3, height, width), np.float32)
     truth, valid = torch.zeros(len(chosen), MOST, 4), torch.zeros(len(chosen), MOST, dtype=torch.bool)
     for row, i in enumerate(chosen):
-        image, boxes = vary(rng, data.images[i], data.boxes[i, : data.count[i]], strength)
-        if crop_px is not None:
-            image, boxes = crop(rng, image, boxes, crop_px)
+        alikes = data.alikes[i][~np.isnan(data.alikes[i, :, 0])]
+        boxes = data.boxes[i, : data.count[i]]
+        image, boxes = part_of(rng, data.images[i], boxes, alikes, (width, height), strength)
         images[row] = image[:, :, ::-1].transpose(2, 0, 1) * np.float32(1 / 255)
         truth[row, : len(boxes)] = torch.from_numpy(boxes.astype(np.float32))
         valid[row, : len(boxes)] = True

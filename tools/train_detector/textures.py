@@ -1,12 +1,8 @@
-"""Clutter for pictures and for training a detector: collages of shapes and letters, faces of cubes."""
+"""Clutter for training: collages of shapes and letters."""
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-
-from vergence_sim.pictures import CUBE_COLOURS_BGR, stickers
-
-__all__ = ["CUBE_COLOURS_BGR", "cloud", "collage", "cube_face", "painted"]
 
 Image = npt.NDArray[np.uint8]
 
@@ -52,8 +48,3 @@ def collage(rng: np.random.Generator, size_px: int, pieces: int = 90, plain: flo
             end = tuple(int(v) for v in np.array(centre) + rng.integers(-extent * 3, extent * 3 + 1, 2))
             cv2.line(image, centre, end, colour, int(rng.integers(1, 5)), cv2.LINE_AA)
     return np.clip(image + cloud(rng, size_px, 8, 0.85)[:, :, None] * 7, 0, 255).astype(np.uint8)
-
-
-def cube_face(rng: np.random.Generator, size_px: int = 192) -> Image:
-    """Return (n, n, 3) of one face of a Rubik's cube with any colours on its nine stickers."""
-    return stickers(rng, [CUBE_COLOURS_BGR[int(c)] for c in rng.integers(0, 6, 9)], 3, size_px)
