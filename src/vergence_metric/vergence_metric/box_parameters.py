@@ -67,6 +67,12 @@ class DetectorParameters(Parameters):
         read_only=True,
     )
 
+    second_look: bool = parameter(
+        True,
+        "look at each box again on a crop of the full image, for finer sides and a surer score; models with a fixed "
+        "input size or suppression inside look once",
+    )
+
     def check(self) -> None:
         """Raise ParameterError where only one side of the input is given."""
         super().check()

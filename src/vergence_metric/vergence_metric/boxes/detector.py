@@ -9,17 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.box_parameters import DetectorParameters
-from vergence_metric.boxes.decoding import decode
+from vergence_metric.boxes.decoding import Raw, decode
 from vergence_metric.boxes.detections import Detections, make_detections
 from vergence_metric.boxes.errors import DetectorImageError, ModelClassError
 from vergence_metric.boxes.layouts import find_layout
 from vergence_metric.boxes.letterbox import Letterbox, blob
+from vergence_metric.boxes.second_look import CROP_PX, look_again
 from vergence_metric.boxes.session import ModelSession
 from vergence_metric.boxes.suppression import suppress
 
 _DEFAULT_SIZE_PX = (640, 640)
 _DEFAULT_THRESHOLD = 0.35
 _GREY = 114
+_FIRST_SHARE = 0.5  # of the threshold: what the first look need say for a second one
+_CLOSER_LEAST = 0.05
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,9 @@ class Detector:
         self.preprocessing = _preprocessing(parameters, self.layout.name, self._session.input.dtype)
         self.class_names = names or tuple(str(i) for i in range(self.layout.classes or 0))
         self._letterboxes: dict[tuple[int, int], Letterbox] = {}
+        fixed = self._session.input.width_px or self._session.input.height_px
+        # Suppression inside the model has its own threshold, which hides what a second look could have saved.
+        self._takes_crops = not (fixed or self.layout.suppressed or any(s % self._session.stride_px() for s in CROP_PX))
         self.set_parameters(parameters)
 
     @property
@@ -76,7 +82,8 @@ class Detector:
         width, height = self.input_px
         return (
             f"{self.path.name}: {self.layout}, input {width}x{height} {how.color} "
-            f"{'0..1' if how.unit_scale else '0..255'} by {how.resize}, threshold {self.threshold:g}"
+            f"{'0..1' if how.unit_scale else '0..255'} by {how.resize}, threshold {self.threshold:g}, "
+            f"{'looks twice' if self.looks_twice else 'looks once'}"
         )
 
     def set_parameters(self, parameters: DetectorParameters) -> None:
@@ -90,9 +97,10 @@ class Detector:
 
     def detect(self, image: NDArray[Any]) -> Detections:
         """Return the objects in an image (h, w, 3) BGR or (h, w) grey uint8; raises DetectorImageError for others."""
-        outputs = self._session.run(self._tensor(image))
-        p, size = self._parameters, (image.shape[1], image.shape[0])
-        raw = decode(self.layout, outputs, self.input_px, self.threshold)
+        colour = _colour(image)
+        p, size, wanted = self._parameters, (image.shape[1], image.shape[0]), self.threshold
+        outputs = self._session.run(self._tensor(colour))
+        raw = decode(self.layout, outputs, self.input_px, _FIRST_SHARE * wanted if self.looks_twice else wanted)
         chosen = np.arange(len(raw.scores))
         if self._wanted is not None:
             chosen = chosen[np.isin(raw.class_ids, self._wanted)]
@@ -100,20 +108,43 @@ class Detector:
             chosen = chosen[suppress(raw.xyxy[chosen], raw.scores[chosen], raw.class_ids[chosen], p.iou, p.max_det)]
         else:
             chosen = chosen[np.argsort(-raw.scores[chosen], kind="stable")][: p.max_det]
-        boxes = self._letterboxes[size].to_source(raw.xyxy[chosen])
-        return make_detections(boxes, raw.scores[chosen], raw.class_ids[chosen], self.class_names, size)
+        boxes, scores, ids = (
+            self._letterboxes[size].to_source(raw.xyxy[chosen]),
+            raw.scores[chosen],
+            raw.class_ids[chosen],
+        )
+        if self.looks_twice:
+            boxes, scores = look_again(colour, boxes, scores, ids, self._see)
+            # Two first boxes may turn out to be one thing.
+            kept = suppress(boxes, scores, ids, p.iou, p.max_det)
+            kept = kept[scores[kept] >= wanted]
+            boxes, scores, ids = boxes[kept], scores[kept], ids[kept]
+        return make_detections(boxes, scores, ids, self.class_names, size)
 
-    def _tensor(self, image: NDArray[Any]) -> NDArray[Any]:
-        if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in ((), (3,)) or not image.size:
-            raise DetectorImageError(
-                f"image is {image.dtype} {image.shape}: allowed is uint8 (h, w, 3) or (h, w), not empty"
-            )
-        colour = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)) if image.ndim == 2 else image
-        size = (image.shape[1], image.shape[0])
+    @property
+    def looks_twice(self) -> bool:
+        """True if boxes are looked at again: asked for, and the model takes crops."""
+        return self._parameters.second_look and self._takes_crops
+
+    def _see(self, picture: NDArray[np.uint8]) -> Raw:
+        how = self.preprocessing
+        tensor = blob(picture, how.color, how.unit_scale, self._session.input.dtype)
+        return decode(self.layout, self._session.run(tensor), CROP_PX, _CLOSER_LEAST)
+
+    def _tensor(self, colour: NDArray[np.uint8]) -> NDArray[Any]:
+        size = (colour.shape[1], colour.shape[0])
         if size not in self._letterboxes:
             self._letterboxes = {size: Letterbox.fit(size, self.input_px, self.preprocessing.resize)}
         how = self.preprocessing
         return blob(self._letterboxes[size].place(colour), how.color, how.unit_scale, self._session.input.dtype)
+
+
+def _colour(image: NDArray[Any]) -> NDArray[np.uint8]:
+    if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in ((), (3,)) or not image.size:
+        raise DetectorImageError(
+            f"image is {image.dtype} {image.shape}: allowed is uint8 (h, w, 3) or (h, w), not empty"
+        )
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image, np.uint8)
 
 
 def _input_size(session: ModelSession, parameters: DetectorParameters) -> tuple[int, int]:
