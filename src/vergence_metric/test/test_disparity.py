@@ -156,3 +156,14 @@ def test_every_name_is_known():
 def test_parameters_that_do_not_fit_are_named(changes, words):
     with pytest.raises(ParameterError, match=words):
         DisparityParameters(**changes)
+
+
+def test_sigma_grows_where_another_surface_is_in_sight():
+    wall, thing = texture(8), texture(9)
+    alone = estimator().estimate(view(wall), view(wall, 3.25))
+    left, right = view(wall), view(wall, 3.25)
+    left[220:260, 300:340] = view(thing)[220:260, 300:340]
+    right[220:260, 290:330] = view(thing)[220:260, 300:340]
+    among = estimator().estimate(left, right)
+    assert among.horizontal_px == pytest.approx(10.0, abs=0.1)
+    assert alone.sigma_px < 0.03 < 0.06 < among.sigma_px < 0.3
