@@ -3,7 +3,7 @@
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,8 +24,9 @@ from vergence_common.stamps import to_nanoseconds
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, TrueVergence
 
-# A second's: the boxes come after the images, the later the busier the machine.
+# A second's: the metrics come after the images, the later the busier the machine.
 _KEPT_IMAGES = 30
+_CHOOSY_S = 3.0
 
 
 class Stamped(NamedTuple):
@@ -42,6 +43,11 @@ class StereoPicture(NamedTuple):
     right_bgr: npt.NDArray[np.uint8]
     edge: EdgeVergence
     box: BoxVergence | None
+
+
+def _pair_of(message: Any) -> tuple[int, float]:
+    """Return what tells a pair of images from every other."""
+    return to_nanoseconds(message.header.stamp), message.pair_skew_s
 
 
 class Recorder:
@@ -122,17 +128,32 @@ class Recorder:
         if not answer.result.successful:
             raise GraphError(f"{node_name} refused {values}: {answer.result.reason}")
 
-    def picture(self, with_boxes: bool, alive: Callable[[], None], timeout_s: float = 10.0) -> StereoPicture:
-        """Return the next pair of images together with the metrics that the graph computed from that very pair."""
+    def picture(self, with_boxes: bool, alive: Callable[[], None], timeout_s: float = 20.0) -> StereoPicture:
+        """Return the next pair of images together with the metrics that the graph computed from that very pair.
+
+        The boxes come a few times a second and a busy machine leaves pairs out: where none is of that very pair for a
+        while, the newest ones are taken. Call it while nothing moves.
+        """
         for images in self._images.values():
             images.clear()
+        first_box, choosy_until_s = len(self.boxes), time.monotonic() + _CHOOSY_S
         self._in_executor(self._subscribe_to_images, alive)
+
+        def matched() -> tuple[Image, Image, EdgeVergence, BoxVergence | None] | None:
+            boxes = {_pair_of(entry.message): entry.message for entry in self.boxes[first_box:]}
+            for left, right, edge in self._edge_pairs():
+                box = boxes.get(_pair_of(edge))
+                if box is None and boxes and time.monotonic() > choosy_until_s:
+                    box = self.boxes[-1].message
+                if box is not None or not with_boxes:
+                    return left, right, edge, box
+            return None
+
+        what = "a pair of images and its metrics" if with_boxes else "a pair of images and its metric"
         try:
-            what = "a pair of images and its metrics" if with_boxes else "a pair of images and its metric"
-            found = self.wait_for(what, lambda: self._matched(with_boxes), timeout_s, alive)
+            left, right, edge, box = self.wait_for(what, matched, timeout_s, alive)
         finally:
             self._in_executor(self._unsubscribe_from_images, alive)
-        left, right, edge, box = found
         return StereoPicture(image_to_array(left).copy(), image_to_array(right).copy(), edge, box)
 
     def _in_executor(self, work: Callable[[], None], alive: Callable[[], None]) -> None:
@@ -149,21 +170,18 @@ class Recorder:
             self.node.destroy_subscription(subscription)
         self._image_subscriptions = []
 
-    def _matched(self, with_boxes: bool) -> tuple[Image, Image, EdgeVergence, BoxVergence | None] | None:
-        lately = (entry.message for entry in self.boxes[-_KEPT_IMAGES:])
-        boxes = {(to_nanoseconds(box.header.stamp), box.pair_skew_s): box for box in lately}
+    def _edge_pairs(self) -> Iterator[tuple[Image, Image, EdgeVergence]]:
+        """Give the pairs of images of which the edge metric is known, newest first."""
         for entry in reversed(self.edges[-_KEPT_IMAGES:]):
             edge = entry.message
             left_ns = to_nanoseconds(edge.header.stamp)
             left = self._images["left"].get(left_ns)
-            box = boxes.get((left_ns, edge.pair_skew_s))
-            if left is None or (with_boxes and box is None):
+            if left is None:
                 continue
             right_ns = left_ns + round(edge.pair_skew_s * 1e9)
             for stamp, right in self._images["right"].items():
                 if abs(stamp - right_ns) < 1_000_000:
-                    return left, right, edge, box
-        return None
+                    yield left, right, edge
 
     def _keep(self, eye: str) -> Callable[[Image], None]:
         def keep(message: Image) -> None:
