@@ -140,9 +140,9 @@ class Terminal:
         self.shown = ""
 
     def expect(self, text: str) -> None:
-        deadline_s = time.monotonic() + 20
+        deadline_s = time.monotonic() + 90
         while text not in self.shown:
-            assert select.select([self._master], [], [], deadline_s - time.monotonic())[0], self.shown
+            assert select.select([self._master], [], [], max(0.0, deadline_s - time.monotonic()))[0], self.shown
             self.shown += os.read(self._master, 65536).decode(errors="replace")
         self.shown = self.shown.split(text, 1)[1]
 
@@ -150,7 +150,7 @@ class Terminal:
         os.write(self._master, keys.encode())
 
     def close(self) -> None:
-        self.process.wait(20)
+        self.process.wait(90)
         os.close(self._master)
 
 
