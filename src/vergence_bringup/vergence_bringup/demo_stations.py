@@ -94,7 +94,7 @@ def cube_told_apart() -> Station:
     """Return the detector's own station: a nearer thing like the cube stands before the eyes, the cube is asked for."""
     return Station(
         "cube_told_apart",
-        "0.65 m, asked for by its class; a look-alike stands nearer, and nearer to where the eyes look",
+        "0.65 m, asked for by its class; a puzzle of 4 by 4 cells stands nearer, and nearer to where the eyes look",
         "cube",
         _at(0.65, 8.0, 3.0),
         by_class=True,

@@ -50,7 +50,7 @@ class SimParameters(Parameters):
         read_only=True,
     )
     distractor: str = parameter(
-        "die",
+        "four",
         "what is put at sim/distractor_pose, 6 cm wide, in the cube's colours: a puzzle of so many cells a side, a "
         "die, a plain or a striped block",
         choices=DISTRACTORS,
