@@ -21,7 +21,6 @@ from vergence_common.qos import IMAGE_QOS
 from vergence_msgs.msg import GazeState
 from vergence_rig.rig import JOINT_NAMES, default_rig
 from vergence_servo.gaze_controller_node import GazeControllerNode
-from vergence_servo.identifying import identified_head_node
 from vergence_servo.identifying.axis_log import EYES, IdentifyError, Move
 from vergence_servo.identifying.identified_head_node import IdentifiedHead
 from vergence_servo.identifying.identified_rig import nodes_text
@@ -115,11 +114,6 @@ def start(domain_id: int) -> Iterator[Start]:
     context.try_shutdown()
 
 
-@pytest.fixture(autouse=True)
-def patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(identified_head_node, "_DISCOVERY_S", 40.0)
-
-
 def wait_for(condition: Callable[[], bool], what: str) -> None:
     deadline_s = time.monotonic() + PATIENCE_S
     while not condition():
@@ -130,7 +124,7 @@ def wait_for(condition: Callable[[], bool], what: str) -> None:
 @pytest.mark.parametrize("compressed", [False, True])
 def test_moves_are_recorded_and_the_head_is_left_where_it_was(start: Start, compressed: bool) -> None:
     node = start(PaleHead, compressed=compressed)
-    with IdentifiedHead(default_rig()) as head:
+    with IdentifiedHead(default_rig(), patience_s=PATIENCE_S) as head:
         assert head.begin() == []
         wait_for(lambda: len(head.heard_models()) == 1, "camera_info")
         cameras = head.cameras()
@@ -166,7 +160,7 @@ def test_a_controller_is_silenced_and_gets_its_way_back(start: Start, before: st
     if before == "disabled":
         controller._controller.enable(False, 0.0)
     wait_for(lambda: bool(states) and (states[-1].phase == GazeState.PHASE_IDLE) == (before != "verging"), before)
-    with IdentifiedHead(default_rig()) as head:
+    with IdentifiedHead(default_rig(), patience_s=PATIENCE_S) as head:
         wait_for(lambda: head._controllers._state is not None, "gaze/state heard")
         assert head.begin() == ["/gaze_controller_node"]
         assert not controller._controller._enabled
@@ -188,7 +182,7 @@ def test_somebody_elses_commands_are_refused_with_a_name(start: Start) -> None:
     wait_for(lambda: publisher.get_subscription_count() > 0, "matched")
     with (
         pytest.raises(IdentifyError, match=r"joint_command has \d+ commands of somebody else \(/stubborn\)"),
-        IdentifiedHead(default_rig()) as head,
+        IdentifiedHead(default_rig(), patience_s=PATIENCE_S) as head,
     ):
         head.begin()
 
@@ -202,21 +196,27 @@ def test_somebody_elses_commands_are_refused_with_a_name(start: Start) -> None:
     ],
 )
 def test_heads_that_cannot_be_used_are_refused(
-    start: Start, monkeypatch: pytest.MonkeyPatch, options: dict[str, Any], error: type[Exception], text: str
+    start: Start, options: dict[str, Any], error: type[Exception], text: str
 ) -> None:
-    for name, culprit in (("_DISCOVERY_S", "listens"), ("_PATIENCE_S", "sees")):
-        monkeypatch.setattr(identified_head_node, name, 2.0 if culprit in options else 40.0)
     start(PaleHead, **options)
-    with pytest.raises(error, match=text), IdentifiedHead(default_rig()) as head:
-        head.begin()
+    patience_s = 2.0 if "listens" in options else PATIENCE_S
+    with IdentifiedHead(default_rig(), patience_s=patience_s) as head:
+        subscribe = head._subscribe_to_images
+
+        def subscribe_and_soon_give_up() -> None:
+            subscribe()
+            head._patience_s = PATIENCE_S if "stamp_age_s" in options else 2.0
+
+        head._subscribe_to_images = subscribe_and_soon_give_up  # type: ignore[method-assign]
+        with pytest.raises(error, match=text):
+            head.begin()
 
 
-def test_eyes_that_close_in_the_middle_are_refused(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_eyes_that_close_in_the_middle_are_refused(start: Start) -> None:
     node = start(PaleHead)
-    with IdentifiedHead(default_rig()) as head:
+    with IdentifiedHead(default_rig(), patience_s=PATIENCE_S) as head:
         head.begin()
-        monkeypatch.setattr(identified_head_node, "_PATIENCE_S", 1.0)
-        monkeypatch.setattr(node, "_show", lambda: None)
+        head._patience_s = 1.0
         for timer in list(node.timers)[:1]:
             timer.cancel()
         with pytest.raises(IdentifyError, match="no images on left/image_raw and right/image_raw for 1 s"):

@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--assume", choices=ASSUMPTIONS, default="stamps", help="what is right, the images' stamps or joint_states"
     )
     parser.add_argument("--transport", choices=TRANSPORTS, default="auto", help="of the images (default %(default)s)")
+    parser.add_argument("--patience-s", type=float, default=20.0, help="wait for images so long (default %(default)s)")
     parser.add_argument("--namespace", default="", help="the head's namespace, if it has one")
     parser.add_argument("--yes", action="store_true", help="write without asking")
 
@@ -57,7 +58,7 @@ def _identify(options: argparse.Namespace) -> int:
     rig = load_rig(options.rig)
     parameters = IdentifyParameters(amplitude_deg=options.amplitude_deg, steps=options.steps, rest_s=options.rest_s)
     out: Path = options.out or Path(options.rig or "rig_identified.yaml")
-    with IdentifiedHead(rig, options.namespace, options.transport) as head:
+    with IdentifiedHead(rig, options.namespace, options.transport, options.patience_s) as head:
         try:
             for name in head.begin():
                 _say(f"{name} is disabled meanwhile")

@@ -25,8 +25,6 @@ from vergence_servo.running_head_node import REPEAT_S, RunningHead
 
 TRANSPORTS = ("auto", "raw", "compressed")
 
-_DISCOVERY_S = 20.0
-_PATIENCE_S = 20.0
 _LISTEN_S = 0.6
 _START_S = 1.0
 _FRAMES_AT_REST = 3
@@ -37,11 +35,14 @@ _WHOLE_TURN_RAD = math.tau
 
 
 class IdentifiedHead(RunningHead):
-    """A head under way: on leaving the block the eyes are back where they were, and the controller is enabled again."""
+    """A head under way: on leaving the block the eyes are back where they were, and the controller is enabled again.
 
-    def __init__(self, rig: Rig, namespace: str = "", transport: str = "auto") -> None:
+    `patience_s` is how long images, joint_states and whoever takes commands may keep it waiting.
+    """
+
+    def __init__(self, rig: Rig, namespace: str = "", transport: str = "auto", patience_s: float = 20.0) -> None:
         super().__init__("vergence_identify", namespace, own_signals=True)
-        self._rig, self._transport = rig, transport
+        self._rig, self._transport, self._patience_s = rig, transport, patience_s
         self._controllers = Controllers(self.node, "joint_command")
         self._own_ns: deque[int] = deque(maxlen=500)
         self._foreign = 0
@@ -71,10 +72,10 @@ class IdentifiedHead(RunningHead):
 
         Returns the names of the controllers that were silenced. Raises HeadError, IdentifyError.
         """
-        self.wait_for_servos(_DISCOVERY_S)
-        self._wait(lambda: len(self._present) == len(JOINT_NAMES), _DISCOVERY_S, self._no_joints)
+        self.wait_for_servos(self._patience_s)
+        self._wait(lambda: len(self._present) == len(JOINT_NAMES), self._no_joints)
         self._subscribe_to_images()
-        self._wait(lambda: all(self._newest.values()), _PATIENCE_S, self._no_images)
+        self._wait(lambda: all(self._newest.values()), self._no_images)
         self._check_clocks()
         self._controllers.silence()
         time.sleep(0.1)  # commands on their way
@@ -101,7 +102,7 @@ class IdentifiedHead(RunningHead):
         self._rest(self.tell(pose), moves[0].rest_s)
         with self.arrival:
             self._frames, self._reports = {eye: Frames() for eye in EYES}, []
-        self._wait(lambda: all(f.stamps_s for f in (self._frames or {}).values()), _PATIENCE_S, self._no_images)
+        self._wait(lambda: all(f.stamps_s for f in (self._frames or {}).values()), self._no_images)
         commands = []
         for move in moves:
             stamp_s = self.tell(pose | {joint: pose[joint] + move.angle_rad})
@@ -133,7 +134,7 @@ class IdentifiedHead(RunningHead):
         return names.pop() if len(names) == 1 else ""
 
     def _subscribe_to_images(self) -> None:
-        deadline_s = time.monotonic() + _DISCOVERY_S
+        deadline_s = time.monotonic() + self._patience_s
         kinds: dict[str, Any] = {"raw": RawImage, "compressed": CompressedImage}
         for eye in EYES:
             names = {"raw": f"{eye}/image_raw", "compressed": f"{eye}/image_raw/compressed"}
@@ -215,27 +216,27 @@ class IdentifiedHead(RunningHead):
                 for newest in self._newest.values()
             )
 
-        self._wait(rested, _PATIENCE_S, self._no_images)
+        self._wait(rested, self._no_images)
 
-    def _wait(self, condition: Any, patience_s: float, complaint: Any) -> None:
+    def _wait(self, condition: Any, complaint: Any) -> None:
         """Wait for a condition; the patience begins anew with every image."""
         with self.arrival:
             while not condition():
                 counts = {eye: newest[-1:] for eye, newest in self._newest.items()}
-                if not self.arrival.wait_for(condition, patience_s):
+                if not self.arrival.wait_for(condition, self._patience_s):
                     stuck = [eye for eye, newest in self._newest.items() if newest[-1:] == counts[eye]]
                     if stuck or not self._newest:
-                        raise IdentifyError(complaint(stuck, patience_s))
+                        raise IdentifyError(complaint(stuck))
 
-    def _no_images(self, stuck: Sequence[str], patience_s: float) -> str:
+    def _no_images(self, stuck: Sequence[str]) -> str:
         if self._problem:
             return self._problem
         topics = " and ".join(self._topics.get(eye, f"{eye}/image_raw") for eye in stuck)
-        return f"no images on {topics} for {patience_s:g} s: allowed are some every second; do the cameras run?"
+        return f"no images on {topics} for {self._patience_s:g} s: allowed are some every second; do the cameras run?"
 
-    def _no_joints(self, stuck: Sequence[str], patience_s: float) -> str:
+    def _no_joints(self, stuck: Sequence[str]) -> str:
         missing = ", ".join(name for name in JOINT_NAMES if name not in self._present)
-        return f"no joint_states of {missing} for {patience_s:g} s: allowed are some; does servo_node run?"
+        return f"no joint_states of {missing} for {self._patience_s:g} s: allowed are some; does servo_node run?"
 
     def _interval_s(self) -> float:
         with self.arrival:

@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 _STEP_S = 0.001
 _EARLIEST_S = -0.05
 _SPEEDS_RAD_S = np.geomspace(0.5, 64.0, 29)
-_JITTERS_S = np.array([0.0005, 0.001, 0.002, 0.004, 0.007, 0.012, 0.02])
+_JITTERS_S = np.array([0.0005, 0.001, 0.002, 0.004, 0.007, 0.012, 0.02, 0.04, 0.08])
 _LEAST_STEPS = 4
 _SLACK = 0.03
 _OUTLIER_FRAME, _OUTLIER_STEP = 0.02, 0.03
@@ -150,7 +150,7 @@ def _likelihood(step: Step, onsets_s: Array) -> Array:
 
 def _joint(single: Array, jitter_s: float) -> Array:
     """Return the log posterior (speeds, onsets) if every step's latency varies by `jitter_s` about the common one."""
-    reach = int(np.ceil(4.0 * jitter_s / _STEP_S))
+    reach = min(int(np.ceil(4.0 * jitter_s / _STEP_S)), (single.shape[-1] - 1) // 2)  # "same" is of the longer one
     offsets = np.arange(-reach, reach + 1) * _STEP_S
     kernel = np.exp(-0.5 * (offsets / jitter_s) ** 2)
     kernel /= kernel.sum()
