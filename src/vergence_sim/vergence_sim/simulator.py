@@ -187,6 +187,10 @@ class Simulator:
         """Return the truth about the target now."""
         return self._truth.look(self.parameters.target, self.head.true_rad)
 
+    def mean_disparity_px(self, grid: int) -> float:
+        """Return the mean disparity of what both eyes see of the target, from grid x grid rays an eye; see `truth`."""
+        return self._truth.mean_disparity(self.parameters.target, grid)
+
     def project(self, eye: str, point_m: Sequence[float] | Array) -> tuple[float, float]:
         """Return where an eye sees a point of rig_base (3,) [m], before its lens distorts it [px]; NaN behind it."""
         return self._truth.project(eye, self._in_world(np.asarray(point_m, np.float64)))

@@ -114,6 +114,10 @@ class TruthTeller:
             right_px=self._lenses["right"].distorted(self.project("right", point)),
         )
 
+    def mean_disparity(self, target: str, grid: int) -> float:
+        """Return the mean disparity of the target's surface that both eyes see [px], from grid x grid rays an eye."""
+        return self._mean_disparity(self._samples(target, grid)[0])
+
     def project(self, eye: str, point: Array) -> tuple[float, float]:
         """Return where a world point is in an eye's image, before its lens distorts it [px]; NaN behind it."""
         ((x, y),) = self._project(eye, np.asarray(point)[None]).tolist()
@@ -198,23 +202,23 @@ class TruthTeller:
             points += [np.array(self._data.geom_xpos[geom]) + rotation @ corner for corner in corners]
         return points
 
-    def _samples(self, target: str) -> tuple[Array, dict[str, float]]:
+    def _samples(self, target: str, grid: int = _GRID) -> tuple[Array, dict[str, float]]:
         """Sample the target's surface through both eyes' images: points (N, 3) that both see, and each eye's share."""
         samples: list[Array] = []
         shares: dict[str, float] = {}
         for eye, other in (("left", "right"), ("right", "left")):
-            points = self.surface(eye, target, self._grid(eye, target))
+            points = self.surface(eye, target, self._grid(eye, target, grid))
             seen = self.sees(eye, points)
             shares[eye] = float(seen.mean()) if len(points) else 0.0
             samples.append(points[seen][self.sees(other, points[seen])])
         return np.concatenate(samples), shares
 
-    def _grid(self, eye: str, target: str) -> Array:
+    def _grid(self, eye: str, target: str, count: int) -> Array:
         places = self._project(eye, np.array(self._outline(target)))
         if np.isnan(places).any():
             return np.empty((0, 2))
         low, high = places.min(axis=0), places.max(axis=0)
-        shares = (np.arange(_GRID) + 0.5) / _GRID
+        shares = (np.arange(count) + 0.5) / count
         u, v = np.meshgrid(low[0] + shares * (high[0] - low[0]), low[1] + shares * (high[1] - low[1]))
         return np.column_stack([u.ravel(), v.ravel()])
 
