@@ -7,6 +7,7 @@ cyclic. Its mean absolute gradient at the centre (41 px window, across) is at le
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ WIDTH, HEIGHT = 640, 480
 MINIMUM_GRADIENT = 3.0
 _SIZE = 1700
 _MIDDLE = (_SIZE - 1) / 2
+_POOL = 48
 
 
 @dataclass(frozen=True)
@@ -85,10 +87,11 @@ def hard(count: int, seed: int, reach_px: float) -> Iterator[Pair]:
 def deceptive(count: int, seed: int) -> Iterator[tuple[str, Pair]]:
     """Yield (kind, pair) in turn: blank walls, repeated textures, unrelated views, one eye covered."""
     rng = np.random.default_rng(seed)
-    kinds = (_blank, _stripes, _board, _tiles, _unrelated, _covered)
+    pool = [texture(rng) for _ in range(_POOL)]  # each is seen at another roll every time
+    kinds = (_blank, _stripes, _board, _tiles, partial(_unrelated, pool=pool), partial(_covered, pool=pool))
+    names = ("blank", "stripes", "board", "tiles", "unrelated", "covered")
     for k in range(count):
-        draw = kinds[k % len(kinds)]
-        yield draw.__name__[1:], draw(rng)
+        yield names[k % len(kinds)], kinds[k % len(kinds)](rng)
 
 
 def _digitised(grey: NDArray[np.floating], rng: np.random.Generator, noise: float) -> Image:
@@ -134,12 +137,17 @@ def _tiles(rng: np.random.Generator) -> Pair:
     return _periodic(rng, cv2.resize(128 + 45 * fine / fine.std(), (512, 512)))
 
 
-def _unrelated(rng: np.random.Generator) -> Pair:
-    return Pair(view(texture(rng), rng, noise=2.0), view(texture(rng), rng, noise=2.0), None)
+def _rolled(rng: np.random.Generator, grey: Grey, noise: float) -> Image:
+    return view(grey, rng, roll_deg=rng.uniform(-180.0, 180.0), noise=noise)
 
 
-def _covered(rng: np.random.Generator) -> Pair:
+def _unrelated(rng: np.random.Generator, pool: list[Grey]) -> Pair:
+    first, second = rng.choice(len(pool), 2, replace=False)
+    return Pair(_rolled(rng, pool[first], 2.0), _rolled(rng, pool[second], 2.0), None)
+
+
+def _covered(rng: np.random.Generator, pool: list[Grey]) -> Pair:
     hand = cv2.resize(rng.uniform(10, 60, (6, 8)).astype(np.float32), (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC)
-    images = [view(texture(rng), rng, noise=3.0), _digitised(hand, rng, 3.0)]
+    images = [_rolled(rng, pool[rng.integers(len(pool))], 3.0), _digitised(hand, rng, 3.0)]
     first = int(rng.integers(2))
     return Pair(images[first], images[1 - first], None)
