@@ -32,8 +32,11 @@ def draw(left: NDArray[Any], right: NDArray[Any], result: BoxVergenceResult) -> 
         # The left box once more in the right view: what separates the two is the metric.
         _frame(picture, result.left, width, ink, 1, named=False)
     for row, text in enumerate(overlay_lines(result)):
-        for colour, thickness in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-            cv2.putText(picture, text, (6, 16 + 15 * row), _FONT, 0.42, colour, thickness, cv2.LINE_AA)
+        (wide, high), _ = cv2.getTextSize(text, _FONT, 0.42, 1)
+        x, y = 6, 16 + 15 * row
+        # A ground of its own: OpenCV 5 spaces a broader outline of the same text differently.
+        cv2.rectangle(picture, (x - 3, y - high - 2), (x + wide + 3, y + 4), (0, 0, 0), -1)
+        cv2.putText(picture, text, (x, y), _FONT, 0.42, (255, 255, 255), 1, cv2.LINE_AA)
     return picture
 
 
