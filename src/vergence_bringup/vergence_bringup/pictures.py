@@ -10,6 +10,9 @@ import numpy.typing as npt
 
 Image = npt.NDArray[np.uint8]
 
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_INK_BGR = (80, 230, 80)
+
 
 class PictureError(ValueError):
     """A picture that cannot be read or written."""
@@ -63,8 +66,11 @@ def with_box(picture: Image, xyxy_px: Sequence[float], label: str) -> Image:
     """Return a copy with a box (x_min, y_min, x_max, y_max) and its label drawn on it."""
     marked = picture.copy()
     x_min, y_min, x_max, y_max = (round(value) for value in xyxy_px)
-    place = (x_min, max(y_min - 5, 11))
-    for ink, width in (((0, 0, 0), 3), ((80, 230, 80), 1)):
-        cv2.rectangle(marked, (x_min, y_min), (x_max, y_max), ink, width)
-        cv2.putText(marked, label, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, ink, width, cv2.LINE_AA)
+    cv2.rectangle(marked, (x_min, y_min), (x_max, y_max), (0, 0, 0), 3)
+    cv2.rectangle(marked, (x_min, y_min), (x_max, y_max), _INK_BGR, 1)
+    (width, height), _ = cv2.getTextSize(label, _FONT, 0.42, 1)
+    x, y = x_min, max(y_min - 6, height + 3)
+    # A ground of its own: OpenCV 5 spaces a broader outline of the same text differently.
+    cv2.rectangle(marked, (x - 2, y - height - 3), (x + width + 2, y + 3), (0, 0, 0), -1)
+    cv2.putText(marked, label, (x, y), _FONT, 0.42, _INK_BGR, 1, cv2.LINE_AA)
     return marked
