@@ -36,8 +36,11 @@ def draw_overlay(left: NDArray[Any], result: EdgeMetricResult, disparity: Dispar
         seen = (round(disparity.point_px[0] - disparity.horizontal_px), fovea[1])
         cv2.arrowedLine(picture, fovea, seen, (60, 60, 255), 2, tipLength=0.2)
     for row, text in enumerate(overlay_lines(result, disparity)):
-        for ink, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-            cv2.putText(picture, text, (6, 16 + 15 * row), _FONT, 0.42, ink, width, cv2.LINE_AA)
+        (wide, high), _ = cv2.getTextSize(text, _FONT, 0.42, 1)
+        x, y = 6, 16 + 15 * row
+        # A ground of its own: OpenCV 5 spaces a broader outline of the same text differently.
+        cv2.rectangle(picture, (x - 3, y - high - 2), (x + wide + 3, y + 4), (0, 0, 0), -1)
+        cv2.putText(picture, text, (x, y), _FONT, 0.42, (255, 255, 255), 1, cv2.LINE_AA)
     return picture
 
 
