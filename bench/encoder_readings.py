@@ -68,8 +68,8 @@ class DrawnFeatures:
         self._centre = random.normal(0.0, PARAMETERS.centre_doubt_px, (2, 2))
 
     def __call__(self, head: FakeHead) -> EyeRotationReading | None:
-        """Return the reading, None while the eyes move."""
-        if not self._watch.rests(head):
+        """Return the reading, None while the eyes move or when they have been read often enough."""
+        if not self._watch.rests(head) or self._watch.times > READINGS_PER_REST:
             return None
         focal_px = head.rig.left_camera.fx_px
         said = np.array([head.reported_rad[name] for name in JOINT_NAMES])
