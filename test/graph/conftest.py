@@ -14,6 +14,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
+from vergence_common import diagnostics
 from vergence_common.qos import STATE_QOS
 
 AnyNode = TypeVar("AnyNode", bound=Node)
@@ -95,6 +96,12 @@ class Graph:
                 close()
             node.destroy_node()
         self.executor.shutdown()
+
+
+@pytest.fixture(autouse=True)
+def quick_diagnostics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten times a second, so that a test that waits for one does not wait long."""
+    monkeypatch.setattr(diagnostics, "PERIOD_S", 0.1)
 
 
 @pytest.fixture

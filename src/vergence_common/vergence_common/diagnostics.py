@@ -7,6 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
+PERIOD_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -21,12 +22,12 @@ class Report:
 class Diagnostics:
     """Publishes the reports of one node. Names are prefixed by the node's own, as `diagnostic_updater` does."""
 
-    def __init__(self, node: Node, hardware_id: str = "none", period_s: float = 1.0) -> None:
+    def __init__(self, node: Node, hardware_id: str = "none") -> None:
         self._node = node
         self._hardware_id = hardware_id
         self._sources: dict[str, Callable[[], Report]] = {}
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._timer = node.create_timer(period_s, self.publish)
+        self._timer = node.create_timer(PERIOD_S, self.publish)
 
     def add(self, name: str, report: Callable[[], Report]) -> None:
         """Ask `report` for its state at every publication. A second source of one name replaces the first."""
