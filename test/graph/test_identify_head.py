@@ -162,6 +162,7 @@ def test_a_controller_is_silenced_and_gets_its_way_back(start: Start, before: st
     wait_for(lambda: bool(states) and (states[-1].phase == GazeState.PHASE_IDLE) == (before != "verging"), before)
     with IdentifiedHead(default_rig(), patience_s=PATIENCE_S) as head:
         wait_for(lambda: head._controllers._state is not None, "gaze/state heard")
+        wait_for(lambda: head._controllers.others() == ["/gaze_controller_node"], "the controller known")
         assert head.begin() == ["/gaze_controller_node"]
         assert not controller._controller._enabled
         count = len(node.told)

@@ -39,7 +39,8 @@ class RunningHead:
         """Held while what came is changed or read, and notified after every change."""
         self._infos: dict[str, CameraInfo] = {}
         self._wanted_rad: dict[str, float] = {}
-        self._telling = threading.Lock()
+        self.telling = threading.Lock()
+        """Held while a command is stamped and published."""
         self._command = self.node.create_publisher(JointState, "joint_command", STATE_QOS)
         for eye in EYES:
             self.node.create_subscription(
@@ -68,7 +69,7 @@ class RunningHead:
 
     def tell(self, joints_rad: Mapping[str, float]) -> float:
         """Command joints [rad] now and until told otherwise; return the command's stamp [s]. Empty: say nothing."""
-        with self._telling:
+        with self.telling:
             self._wanted_rad = dict(joints_rad)
             return self._publish()
 
@@ -100,7 +101,7 @@ class RunningHead:
         return [info.node_name for info in infos if info.node_name != self.node.get_name()]
 
     def _tell(self) -> None:
-        with self._telling:
+        with self.telling:
             if self._wanted_rad:
                 self._publish()
 

@@ -1,6 +1,7 @@
 """Other commanders of a running head: controllers are silenced through their own service, and woken again after."""
 
 import threading
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from vergence_msgs.msg import GazeState
 from vergence_servo.identifying.axis_log import IdentifyError
 
 _SERVICE_PATIENCE_S = 10.0
+_DISCOVERY_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -40,10 +42,7 @@ class Controllers:
 
     def silence(self) -> None:
         """Disable every controller that can be, and keep in `silenced` which. Raises IdentifyError if one refuses."""
-        services = {name for name, _ in self._node.get_service_names_and_types()}
-        for name in self.others():
-            if f"{name}/enable" not in services:
-                continue
+        for name in self._that_can_be():
             state = self._state
             idle = state is not None and state.phase == GazeState.PHASE_IDLE
             disabled = idle and state is not None and state.reason == "disabled"
@@ -51,6 +50,16 @@ class Controllers:
             answer = call(self._node, SetBool, f"{name}/enable", SetBool.Request(data=False))
             if answer is None or not answer.success:
                 raise IdentifyError(f"{name} commands the joints and could not be disabled: stop it first")
+
+    def _that_can_be(self) -> list[str]:
+        """Return the other commanders that can be disabled; services may become known after topics."""
+        deadline_s = time.monotonic() + _DISCOVERY_S
+        while True:
+            services = {name for name, _ in self._node.get_service_names_and_types()}
+            able = [name for name in self.others() if f"{name}/enable" in services]
+            if len(able) == len(self.others()) or time.monotonic() > deadline_s:
+                return able
+            time.sleep(0.1)
 
     def wake(self) -> list[str]:
         """Bring the silenced controllers back to what they did; return the names of those that do not answer."""

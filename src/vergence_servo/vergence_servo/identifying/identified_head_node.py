@@ -183,11 +183,13 @@ class IdentifiedHead(RunningHead):
             self.arrival.notify_all()
 
     def _on_command(self, message: JointState) -> None:
-        if to_nanoseconds(message.header.stamp) not in self._own_ns:
+        with self.telling:
+            own = to_nanoseconds(message.header.stamp) in self._own_ns
+        if not own:
             self._foreign += 1
 
     def on_told(self, stamp_ns: int) -> None:
-        """See RunningHead."""
+        """See RunningHead; called with `telling` held."""
         self._own_ns.append(stamp_ns)
 
     def _check_clocks(self) -> None:
