@@ -28,6 +28,8 @@ WORLDS = range(970_000, 970_006)
 VIEWS = 60
 ALIKE_SEEDS = range(980_000, 980_010)
 ALIKE_VIEWS = 100
+_SURFACE_RAYS = 24  # squared, an eye: with the 6 of the live truth, its own error is 0.2 px
+_POINT_95 = 7.815  # of chi squared, three degrees of freedom
 _NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -38,6 +40,7 @@ class Case:
     frame: StereoFrame
     left: TrueBox | None
     right: TrueBox | None
+    surface_px: float
     result: BoxVergenceResult
 
     @property
@@ -66,12 +69,15 @@ def run(say: Callable[[str], None]) -> list[Row]:
     say(f"{len(whole)} of {len(cases)} pairs show all of the target to both eyes and were measured")
     corners = np.array([c.result.corners.left_minus_right_px - _true_corners(c) for c in whole])
     centers = np.array([c.result.center_px[0] - _true_corners(c)[[0, 2]].mean() for c in whole])
-    refined = np.array([c.result.refined.horizontal_px - c.frame.truth.mean_disparity_px for c in whole])
-    plain = np.array([c.result.center_px[0] - c.frame.truth.mean_disparity_px for c in whole])
+    refined = np.array([c.result.refined.horizontal_px - c.surface_px for c in whole])
+    plain = np.array([c.result.center_px[0] - c.surface_px for c in whole])
     say(f"refined: median {np.nanmedian(np.abs(refined)):.3f} px, {np.isnan(refined).mean():.1%} not refined")
     calibrated = centers / np.array([c.result.sigma_px for c in whole])
     both = [c for c in cases if c.seen_by_both]
     paired = [c for c in both if _right_pair(c)]
+    for case in both:
+        if not _right_pair(case):
+            say(f"not paired: {case.result.status.name} ({case.result.reason})")
     wrong, pairs = _wrong_pairs(say)
     boxes_hz, edge_hz = measure_rates(say)
     return [
@@ -79,8 +85,10 @@ def run(say: Callable[[str], None]) -> list[Row]:
         Row("box.center_rms_px.plain", _rms(centers), "px"),
         Row("box.center_rms_px.refined", _rms(refined), "px", "centres against the surface", _rms(plain)),
         Row("box.sigma_ratio", _rms(calibrated), "error / stated sigma"),
+        Row("box.refined_share", float(np.isfinite(refined).mean()), "share of the pairs"),
+        Row("box.point_inside_95", _inside_95(whole), "share of target points, 0.95 if honest"),
         Row("box.paired_share", len(paired) / len(both), "share"),
-        Row("box.wrong_pairs", float(wrong), f"of {pairs} pairs made"),
+        Row("box.wrong_pairs", float(wrong), f"of {pairs} pairs in {len(ALIKE_SEEDS) * ALIKE_VIEWS} views"),
         Row("box.pairs_per_second", boxes_hz, "Hz"),
         Row("box.edge_pairs_per_second", edge_hz, "Hz, beside it"),
     ]
@@ -103,7 +111,7 @@ def _cases(say: Callable[[str], None]) -> Iterator[Case]:
             left, right = (_cube(simulator.true_boxes(eye)) for eye in ("left", "right"))
             # Far enough apart in time that each pair stands for itself.
             result = measurement.measure(frame.left, frame.right, 100.0 * number, eyes, cameras)
-            yield Case(frame, left, right, result)
+            yield Case(frame, left, right, simulator.mean_disparity_px(_SURFACE_RAYS), result)
         simulator.close()
         say(f"world {seed} measured")
 
@@ -125,6 +133,16 @@ def _true_corners(case: Case) -> np.ndarray:
     assert case.left is not None
     assert case.right is not None
     return _xyxy(case.left) - _xyxy(case.right)
+
+
+def _inside_95(cases: list[Case]) -> float:
+    """Return the share of target points whose error lies within the ellipsoid that should hold 95 % of them."""
+    inside = []
+    for case in cases:
+        if case.result.point is not None:
+            off = case.result.point.point_m - case.frame.truth.target_point_m
+            inside.append(off @ np.linalg.solve(case.result.point.covariance_m2, off) <= _POINT_95)
+    return float(np.mean(inside)) if inside else math.nan
 
 
 def _right_pair(case: Case) -> bool:

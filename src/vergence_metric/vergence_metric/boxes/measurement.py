@@ -21,7 +21,7 @@ from vergence_metric.boxes.refinement import refine
 from vergence_metric.boxes.result import NAN2, UNREFINED, BoxStatus, BoxVergenceResult
 from vergence_metric.boxes.smoothing import LagLimitedFilter
 from vergence_metric.boxes.target_point import TargetPoint, locate
-from vergence_metric.boxes.uncertainty import center_sigma_px, disparity_sigma_px
+from vergence_metric.boxes.uncertainty import direction_sigma_px, disparity_sigma_px
 from vergence_metric.viewing_angles import angular_disparity
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
@@ -195,7 +195,7 @@ class BoxMeasurement:
         if not all(math.isfinite(value) for value in disparity):
             return None
         right_px = left.center_px[0] - disparity[0], left.center_px[1] - disparity[1]
-        sigmas = (center_sigma_px(left, source_per_input), sigma, JOINT_SIGMA_RAD)
+        sigmas = (direction_sigma_px(left, source_per_input), sigma, JOINT_SIGMA_RAD)
         return locate(
             left.center_px, right_px, (geometry.left, geometry.right), geometry.eyes, self._baseline_m, sigmas
         )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vergence_metric.boxes.crop import Crop
 from vergence_metric.boxes.dense_matching import DenseView, match_densely
 from vergence_metric.boxes.detections import Box
+from vergence_metric.boxes.uncertainty import surface_sigma_px
 
 _COARSE_PX = 24  # width to which a box is shrunk for the first match
 _CORE = 0.7  # of the box's sides: its corners may show what is behind
@@ -22,7 +23,6 @@ _SOUND_CORRELATION = 0.7
 _LEAST_SIDE_PX = 8.0
 _LEAST_DEPTH_PX, _DEPTH_SHARE = 1.5, 0.2  # of the box's width: faces of one object differ by no more
 _LEAST_SHARE = 0.3
-_FLOOR_PX, _UNSEEN = 0.06, 0.12
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,7 @@ def refine(left: NDArray[Any], right: NDArray[Any], left_box: Box, right_box: Bo
     share = len(values) / max(int(dense.left.inside.sum() + dense.right.inside.sum()), 1)
     if share < _LEAST_SHARE:
         return _nothing("too little of the boxes could be matched")
-    spread = float(values.std())
-    sigma = math.hypot(_FLOOR_PX * dense.scale, _UNSEEN * (1.0 - share) * spread)
-    return Refinement(float(values.mean()), dense.vertical_px, sigma, share)
+    return Refinement(float(values.mean()), dense.vertical_px, surface_sigma_px(left_box, share), share)
 
 
 def _near(view: DenseView, depth_px: float) -> NDArray[np.float32]:
