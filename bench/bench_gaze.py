@@ -24,6 +24,7 @@ UNSIGNED = "metric_descent"
 STATIC_COUNT = 200
 SIDE_COUNT = 40
 LAW_COUNT = 20
+KEPT_DEG = 1.0
 
 
 def run_all(chosen: Iterable[Scenario], setting: Setting) -> list[tuple[Scenario, Trace]]:
@@ -181,6 +182,25 @@ def occlusion_rows(say: Say) -> list[Row]:
     return rows
 
 
+def crossing_rows(say: Say) -> list[Row]:
+    """A target that passes before another at a different depth: whose are the eyes afterwards?"""
+    rows: list[Row] = []
+    for given, setting in (
+        ("boxes", DEFAULT),
+        ("click", DEFAULT),
+        *(("boxes", Setting(law=law)) for law in OTHER_LAWS[:2]),
+    ):
+        traces = [trace for _, trace in run_all(scenarios.crossings(20 if setting == DEFAULT else 10, given), setting)]
+        after = [trace.error_deg[trace.time_s > scenarios.CROSSED_S + 2.0] for trace in traces]
+        during = [trace.error_deg[np.abs(trace.time_s - scenarios.CROSSED_S) < 0.6] for trace in traces]
+        kept = float(np.mean([bool(errors.max() < KEPT_DEG) for errors in after]))
+        suffix = setting.suffix if given == "boxes" else ".by_track"
+        rows.append(Row(f"gaze.crossing_kept{suffix}", kept, "share"))
+        rows.append(Row(f"gaze.crossing_worst_deg{suffix}", quantile([float(e.max()) for e in during], 0.5), "deg"))
+        say(f"crossing, {given}, {setting.law}: {kept:.2f} kept")
+    return rows
+
+
 def rest_rows(say: Say) -> list[Row]:
     """Motion at rest, with backlash: peak to peak of the joint that moves most."""
     rows: list[Row] = []
@@ -221,6 +241,16 @@ def distance_rows(say: Say) -> list[Row]:
 def run(say: Say) -> list[Row]:
     """Run every part and return all rows."""
     rows: list[Row] = []
-    for part in (static_rows, search_rows, step_rows, pursuit_rows, occlusion_rows, rest_rows, distance_rows):
+    parts = (
+        static_rows,
+        search_rows,
+        step_rows,
+        pursuit_rows,
+        occlusion_rows,
+        crossing_rows,
+        rest_rows,
+        distance_rows,
+    )
+    for part in parts:
         rows += part(say)
     return rows

@@ -24,9 +24,9 @@ from vergence_sim.simulator import Simulator
 Array = npt.NDArray[np.float64]
 
 SERVOS: Mapping[str, ServoSpec] = {"ideal": IDEAL, "sg90": SG90, "mg995": MG995}
-CONTROL_TICKS = 3
+CONTROL_TICKS = 6
 ENCODER_TICKS = 60
-ENCODER_LATENCY_TICKS = 27
+ENCODER_LATENCY_TICKS = 30
 
 Encoder: TypeAlias = Callable[[FakeHead], EyeRotationReading | None]
 """What the visual encoder says of a head as it stands now, if anything."""
@@ -49,6 +49,7 @@ class Scenario:
     visible: Callable[[float], bool] = lambda time_s: True
     clutter: Callable[[float], Array] | None = None
     encoder: Encoder | None = None
+    mistaken: Mapping[str, Callable[[float], Array | None]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -194,11 +195,12 @@ def run(
         scenario.start_rad,
         lambda time_s: time_s >= 0.0 and scenario.visible(time_s),
         scenario.clutter,
+        scenario.mistaken,
         {name: real_servo(servo, realism.servo_spread, random) for name, _ in rig.joints.items()},
         # The target appears at 0; the head has been awake for a while by then, at any phase of its frames.
         begin_s=-TICK_S * int(random.integers(90, 120)),
     )
-    controller = GazeController(rig, GazeParameters(law=setting.law, **dict(parameters or {})))
+    controller = GazeController(rig, GazeParameters(law=setting.law, **dict(parameters or {})), CONTROL_TICKS * TICK_S)
     return _loop(head, controller, scenario)
 
 

@@ -11,6 +11,7 @@ from bench.gaze_runs import Encoder, Scenario
 Array = npt.NDArray[np.float64]
 
 BASELINE_M = 0.065
+CROSSED_S = 2.5
 _HALF_FIELD_RAD = (math.atan(290.0 / 539.0), math.atan(210.0 / 539.0))
 
 
@@ -167,6 +168,61 @@ def occlusions(count: int, given: str = "pairs", seed: int = 7) -> list[Scenario
                 seed=1000 * seed + i,
                 visible=lambda time_s: not 2.0 <= time_s < 3.0,
                 clutter=still(0.6 * point),
+            )
+        )
+    return scenarios
+
+
+def crossings(count: int, given: str = "boxes", seed: int = 10) -> list[Scenario]:
+    """A target that passes at 10 degrees/s before another at 1.6 to 2.2 times its distance, straight ahead at 2.5 s.
+
+    While the two overlap, every estimator takes one for the other about half of the time, in bursts of a tenth of a
+    second; the detector takes the other for the target as soon as it is 6 degrees near, in three bursts out of ten.
+    """
+    scenarios = []
+    for i in range(count):
+        random = np.random.default_rng([seed, i])
+        distance, way = random.uniform(0.4, 0.8), random.choice([-1.0, 1.0])
+        elevation = math.radians(random.uniform(-10.0, 10.0))
+        other = place(distance * random.uniform(1.6, 2.2), 0.0, elevation)
+
+        def azimuth(time_s: float, way: float = way) -> float:
+            return math.radians(way * 10.0 * (min(max(time_s, 1.0), CROSSED_S + 1.5) - CROSSED_S))
+
+        def target(
+            time_s: float,
+            distance: float = distance,
+            elevation: float = elevation,
+            azimuth: Callable[[float], float] = azimuth,
+        ) -> Array:
+            return place(distance, azimuth(time_s), elevation)
+
+        def taken_for(
+            near_rad: float,
+            share: float,
+            draws: Array,
+            other: Array = other,
+            azimuth: Callable[[float], float] = azimuth,
+        ) -> Callable[[float], Array | None]:
+            def mistaken(time_s: float) -> Array | None:
+                wrong = abs(azimuth(time_s)) < near_rad and draws[int(max(time_s, 0.0) * 10.0) % draws.size] < share
+                return other if wrong else None
+
+            return mistaken
+
+        overlap, near = math.radians(2.5), math.radians(6.0)
+        scenarios.append(
+            Scenario(
+                target,
+                fixating(target(0.0)),
+                CROSSED_S + 2.5,
+                given,
+                seed=1000 * seed + i,
+                mistaken={
+                    "fovea": taken_for(overlap, 0.5, random.random(100)),
+                    "track": taken_for(overlap, 0.5, random.random(100)),
+                    "box": taken_for(near, 0.3, random.random(100)),
+                },
             )
         )
     return scenarios

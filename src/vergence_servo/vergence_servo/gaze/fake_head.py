@@ -27,7 +27,7 @@ from vergence_servo.gaze.observations import (
 Array = npt.NDArray[np.float64]
 
 TICK_S = 1.0 / 300.0
-"""Everything happens on this raster: 30 Hz images every 10 ticks, 100 Hz control every 3."""
+"""Everything happens on this raster: 30 Hz images every 10 ticks, 50 Hz joint reports every 6."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,7 @@ class FakeHead:
     mistaken: Mapping[str, Callable[[float], Array | None]] = field(default_factory=dict)
     servos: Mapping[str, ServoSpec] = field(default_factory=dict)
     begin_s: float = 0.0
+    report_ticks: int = 6
 
     def __post_init__(self) -> None:
         self._random = np.random.default_rng(self.seed)
@@ -130,7 +131,7 @@ class FakeHead:
         for plant in (*self._plants.values(), *self._models.values()):
             plant.step(now_s)
         self._note_saccades()
-        if self._ticks % 3 == 0:
+        if self._ticks % self.report_ticks == 0:
             for name in JOINT_NAMES:
                 self.reported_rad[name] = self._models[name].modelled_rad
             self._send(now_s + 0.002, JointReport(now_s, dict(self.reported_rad)))

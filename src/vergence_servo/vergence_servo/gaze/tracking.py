@@ -7,6 +7,7 @@ fovea differ, the boxes' depth is the target's.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,9 @@ Array = npt.NDArray[np.float64]
 _TIMING_SIGMA_S = 0.003
 _FRESH_S = 0.15
 _BOX_LATE_S = 0.4
+_SEEN_THERE_S = 0.3
+_JUMP_PATIENCE_S = 0.12
+_DEPTH_PATIENCE_S = 0.4
 _SAME_DEPTH_RAD = 0.006
 _SIGMA_BOUNDS_RAD = (1e-5, 0.5)
 
@@ -61,7 +65,7 @@ class TargetTracking:
         self._agreement.clear()
         self._wanted_since_s = -math.inf
         self._target_seen_s = self._fovea_agreed_s = -math.inf
-        self._boxes_off_since_s = math.nan
+        self._boxes_off_since_s = self._depth_off_since_s = math.nan
         self._fovea_was_astray = False
 
     def want(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
@@ -108,10 +112,26 @@ class TargetTracking:
             return False
         if math.isfinite(seen[1]):
             vergence = float(seen[1] - seen[0])
-            self._agreement.see_track(sighting.stamp_s, vergence, _own_depth(vergence, sighting.extent_rad))
+            own_depth = _own_depth(vergence, sighting.extent_rad)
+            self._agreement.see_track(sighting.stamp_s, vergence, own_depth)
+            if self._is_sudden_depth(sighting.stamp_s, vergence, own_depth):
+                # Something else covers part of it: where it is can still be told.
+                there = replace(sighting, disparity_rad=math.nan)
+                measurement, seen = directions.track(self._history, there, sigma, disparity_sigma)
         pan, tilt = self._track.offset
         measurement, seen = directions.shifted(measurement, pan, tilt), seen + np.array([pan, pan, tilt])
         return self._believe(measurement, seen, sighting.skew_s, now_s, "track")
+
+    def _is_sudden_depth(self, stamp_s: float, vergence_rad: float, own_depth_rad: float) -> bool:
+        """Tell whether a track's depth is far from what is known, and was not for long: things do not jump in depth."""
+        estimate = self.estimate(stamp_s)
+        if estimate is None or not estimate.sigmas_rad[1] < self._p.verged_enter_rad:
+            return False
+        if abs(vergence_rad - estimate.vergence_rad) <= self._p.disagreement_rad + own_depth_rad:
+            self._depth_off_since_s = math.nan
+            return False
+        self._depth_off_since_s = _first(self._depth_off_since_s, stamp_s)
+        return stamp_s - self._depth_off_since_s < _DEPTH_PATIENCE_S
 
     def see_fovea(self, sighting: FoveaDisparity, now_s: float) -> bool:
         """Take the disparity at the left fovea; True if it was the target's and was believed."""
@@ -187,7 +207,8 @@ class TargetTracking:
     def _boxes_may_jump(self, now_s: float) -> bool:
         """Tell whether boxes elsewhere may be the target's: not while the fovea sees its depth, for a while."""
         off_s = now_s - _first(self._boxes_off_since_s, now_s)
-        return now_s - self._fovea_agreed_s > _FRESH_S or off_s >= self._p.distractor_patience_s
+        seen_there = now_s - self._fovea_agreed_s < _SEEN_THERE_S
+        return off_s >= (self._p.distractor_patience_s if seen_there else _JUMP_PATIENCE_S)
 
     def _heed_boxes(self, stamp_s: float) -> None:
         """Let go of what the boxes say is not the target."""

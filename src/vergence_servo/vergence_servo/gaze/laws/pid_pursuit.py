@@ -1,7 +1,9 @@
 """Coombs and Brown, "Real-time binocular smooth pursuit" (1993): PID pursuit of the centroid, vergence from disparity.
 
-The integral remembers the target's speed, so that a steady ramp is followed without a steady error, and the gaze holds
-while the rig itself turns. As with all feedback on delayed images, the gains are what the latency allows.
+Like theirs it bridges the delay of the images: the target is taken from where it was seen on along the speed that the
+integral remembers, and the error is held against where the axes are now, not against where they were. The integral is
+the target's speed as the eyes have to turn after it, so that a steady ramp is followed without a steady error, and gaze
+holds just so while the rig itself turns. No saccades: what is far off is turned to smoothly.
 """
 
 import math
@@ -16,11 +18,14 @@ from vergence_servo.gaze.parameters import GazeParameters
 Array = npt.NDArray[np.float64]
 
 # version, vergence, tilt
-_PROPORTIONAL = np.array([3.5, 3.5, 3.5])
-_INTEGRAL = np.array([2.5, 1.0, 2.5])
-_DERIVATIVE = np.array([0.1, 0.05, 0.1])
-_LARGEST_INTEGRAL_RAD = 0.25
-_INTEGRATED_RAD = math.radians(8.0)
+_PROPORTIONAL = np.array([10.0, 8.0, 10.0])
+_INTEGRAL = np.array([25.0, 8.0, 25.0])
+_DERIVATIVE = np.array([0.02, 0.0, 0.02])
+_FASTEST_RAD_S = 1.5
+_INTEGRATED_RAD = math.radians(5.0)
+_PLAY_SHARE = 0.25
+_SLOW_RAD_S = 0.03
+_FADE_S = 0.4
 _STALE_S = 0.3
 
 
@@ -31,17 +36,32 @@ class PidPursuitLaw:
     unsigned = False
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
+        plays = [joint.servo.dead_band_rad + joint.servo.backlash_rad for _, joint in rig.joints.items()]
+        self._at_rest_rad = parameters.hold_tolerance_rad + _PLAY_SHARE * max(plays)
         self.reset()
 
     def reset(self) -> None:
-        """Forget the integral and the last error."""
-        self._integral = self._errors = self._slope = np.zeros(3)
+        """Forget the speed and where the target was."""
+        self._speed = np.zeros(3)
+        self._place = np.full(3, np.nan)
+        self._errors = self._slope = np.zeros(3)
         self._stamp_s = -math.inf
 
     def wanted(self, view: LawView) -> Array:
         """Return the joint angles (3,) to command."""
         self._take(view)
-        rates = _PROPORTIONAL * self._errors + _INTEGRAL * self._integral + _DERIVATIVE * self._slope
+        age_s = view.now_s + view.lead_s - self._stamp_s
+        if not age_s < _STALE_S:
+            # Unseen, gaze goes on for a moment and then holds.
+            self._speed = self._speed * math.exp(-view.elapsed_s / _FADE_S)
+            errors = np.zeros(3)
+        else:
+            errors = np.nan_to_num(self._place + self._speed * age_s - _axes(view.shaft_rad))
+            # At rest, what the servos' play cannot mend is left alone: an integral would swing through it for ever.
+            resting = (np.abs(errors) < self._at_rest_rad) & (np.abs(self._speed) < _SLOW_RAD_S)
+            errors = np.where(resting, 0.0, errors)
+            self._speed = np.where(resting, 0.0, self._speed)
+        rates = _PROPORTIONAL * errors + self._speed + _DERIVATIVE * np.where(errors != 0.0, self._slope, 0.0)
         version, vergence, tilt = rates * view.elapsed_s
         return view.turned(version, vergence, tilt)
 
@@ -55,19 +75,28 @@ class PidPursuitLaw:
 
     def _take(self, view: LawView) -> None:
         visual = view.visual
-        if visual is None or view.now_s - visual.stamp_s > _STALE_S:
-            self._errors = self._slope = np.zeros(3)
+        if visual is None or visual.stamp_s <= self._stamp_s:
             return
-        if visual.stamp_s <= self._stamp_s:
-            return
-        left, right, tilt = visual.error_rad
-        pans = [error for error in (left, right) if math.isfinite(error)]
-        version = float(np.mean(pans)) if pans else 0.0
-        errors = np.nan_to_num(np.array([version, right - left if len(pans) == 2 else 0.0, tilt]))
         interval_s = visual.stamp_s - self._stamp_s
+        seen = _axes(visual.target_rad)
         if interval_s < _STALE_S:
-            self._slope = (errors - self._errors) / interval_s
-            # A jump is not a speed: large errors are left to the proportional part.
-            integral = self._integral + np.where(np.abs(errors) < _INTEGRATED_RAD, errors, 0.0) * interval_s
-            self._integral = np.clip(integral, -_LARGEST_INTEGRAL_RAD, _LARGEST_INTEGRAL_RAD)
-        self._errors, self._stamp_s = errors, visual.stamp_s
+            # What the remembered speed did not foretell corrects it; a jump is not a speed.
+            errors = np.nan_to_num(seen - (self._place + self._speed * interval_s))
+            off = np.nan_to_num(seen + self._speed * (view.now_s - visual.stamp_s) - _axes(view.shaft_rad))
+            self._slope = (off - self._errors) / interval_s
+            learns = (np.abs(errors) < _INTEGRATED_RAD) & (np.abs(off) < _INTEGRATED_RAD)
+            self._speed = np.clip(
+                self._speed + np.where(learns, _INTEGRAL * off * interval_s, 0.0), -_FASTEST_RAD_S, _FASTEST_RAD_S
+            )
+            self._errors = off
+        else:
+            self._speed, self._slope, self._errors = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._place = np.where(np.isfinite(seen), seen, self._place + self._speed * min(interval_s, _STALE_S))
+        self._stamp_s = visual.stamp_s
+
+
+def _axes(joints_rad: Array) -> Array:
+    """Return version, vergence and tilt (3,) of joint angles (3,); one eye's pan alone is the version."""
+    left, right, tilt = joints_rad
+    version = 0.5 * (left + right) if math.isfinite(left + right) else (left if math.isfinite(left) else right)
+    return np.array([version, right - left, tilt])
