@@ -19,7 +19,7 @@ class Work:
 
     def run(self, item: int) -> None:
         self.begun.release()
-        assert self.go_on.acquire(timeout=10.0)
+        assert self.go_on.acquire(timeout=60.0)
         if item < 0:
             raise ValueError(item)
         self.done.append(item)
@@ -31,11 +31,11 @@ class Work:
 
     def step(self) -> None:
         self.go_on.release()
-        assert self.ended.acquire(timeout=10.0)
+        assert self.ended.acquire(timeout=60.0)
 
     def begin(self, item: int) -> None:
         self.worker.submit(item)
-        assert self.begun.acquire(timeout=10.0)
+        assert self.begun.acquire(timeout=60.0)
 
 
 @pytest.fixture
