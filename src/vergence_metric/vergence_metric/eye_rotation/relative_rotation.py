@@ -2,9 +2,9 @@
 
 Two views of anything obey the epipolar constraint r_left' [t]x R r_right = 0 (Longuet-Higgins 1981). The baseline is
 the bar on which both eyes sit, so that R and t have five unknowns: by how much the vergence and the left pan differ
-from what the joints say, the right camera's roll and pitch and the left one's roll in their mounts. Vergence shows in the
-constraint only through its product with height and width in the image: it takes features spread over the whole view,
-and a good lens model. Near and far features serve alike; nothing has to be at infinity.
+from what the joints say, the right camera's roll and pitch and the left one's roll in their mounts. Vergence shows in
+the constraint only through its product with height and width in the image: it takes features spread over the whole
+view, and a good lens model. Near and far features serve alike; nothing has to be at infinity.
 
 What the calibration leaves open, both focal lengths and lenses, is estimated with the rest within its own doubt. The
 covariance is that of clustered residuals (Liang and Zeger 1986): features on one thing err together, so that a region
