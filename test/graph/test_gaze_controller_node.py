@@ -15,6 +15,7 @@ from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
@@ -262,3 +263,19 @@ def test_parameters_are_taken_at_run_time_and_refused_when_wrong(scene: Scene) -
     assert not bad.successful
     assert "saccade_threshold_rad" in bad.reason
     scene.until(lambda: scene.states[-1].mode == "left_held", "the mode is taken")
+
+
+def test_the_servos_real_resolution_is_used(scene: Scene) -> None:
+    described = scene.node.resolution_rad
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    resolution = scene.client.create_publisher(JointState, "servo_node/resolution", latched)
+    resolution.publish(JointState(name=list(JOINT_NAMES), position=[0.0077] * 3))
+    scene.until(lambda: scene.node.resolution_rad != described, "the resolution is taken")
+    assert scene.node.resolution_rad == pytest.approx([0.0077] * 3)
+    result = scene.result(scene.send(scene.pixel_goal()))
+    assert result.result == LookAt.Result.VERGED, result.reason
+    scene.until(lambda: scene.states[-1].phase == GazeState.PHASE_FIXATE, "the target is fixated")
+    scene.pass_cycles(50)
+    before = len(scene.head_node.commands)
+    scene.pass_cycles(50)
+    assert np.ptp(scene.head_node.commands[before:], axis=0).max() < 0.0077

@@ -103,6 +103,11 @@ class GazeControllerNode(Node):
         )
         self._timer = self.create_timer(1.0 / values.control_rate_hz, self._cycle)
 
+    @property
+    def resolution_rad(self) -> list[float]:
+        """The smallest step of each joint [rad] that is reckoned with."""
+        return [float(step) for step in self._controller.resolution_rad]
+
     def _now_s(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9
 
