@@ -8,7 +8,7 @@ import cv2
 import torch
 
 from tools.train_detector.card import write_figures
-from tools.train_detector.dataset import load, make
+from tools.train_detector.dataset import HELD_OUT, TRAINING, load, make
 from tools.train_detector.evaluation import evaluate
 from tools.train_detector.export import add_words, export
 from tools.train_detector.network import Detector
@@ -17,19 +17,15 @@ from vergence_metric.boxes.session import SHIPPED_MODEL
 
 TRAINING_SEEDS = 20_000
 HELD_OUT_SEEDS = 900_000
-TARGET_SHARE, MORE_SHARE = 0.85, 0.6
-"""Of training renders with a cube, of those with each further one: dense, for what a render costs."""
-
-HELD_OUT_TARGET_SHARE = 0.5
 
 
 def main() -> int:
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(prog="python -m tools.train_detector", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out/train_detector"), help="renders, state, figures")
-    parser.add_argument("--worlds", type=int, default=140, help="rooms to render for training")
+    parser.add_argument("--worlds", type=int, default=200, help="rooms to render for training")
     parser.add_argument("--views", type=int, default=60, help="renders of each")
-    parser.add_argument("--held-out", type=int, default=8, help="rooms to evaluate on")
+    parser.add_argument("--held-out", type=int, default=12, help="rooms to evaluate on")
     parser.add_argument("--minutes", type=float, default=68.0, help="of training, wall time")
     parser.add_argument("--threads", type=int, default=1, help="of training")
     parser.add_argument("--model", type=Path, help="where the model goes; default: OUT/rubik_cube.onnx")
@@ -45,8 +41,8 @@ def main() -> int:
     folder = options.out
     training = range(TRAINING_SEEDS, TRAINING_SEEDS + options.worlds)
     held_out = range(HELD_OUT_SEEDS, HELD_OUT_SEEDS + options.held_out)
-    make(folder / "data", training, options.views, say, TARGET_SHARE, MORE_SHARE)
-    make(folder / "held_out", held_out, options.views, say, HELD_OUT_TARGET_SHARE)
+    make(folder / "data", training, options.views, TRAINING, say)
+    make(folder / "held_out", held_out, options.views, HELD_OUT, say)
     detector = Detector(classes=1)
     renders = load(sorted((folder / "data").glob("world_*.npz")))
     say(f"training on {len(renders.images)} renders for {options.minutes:g} min")

@@ -73,7 +73,7 @@ def _corner(
     whole, part = np.array(image_px), np.array(part_px)
     for _ in range(6):
         middle, choice = rng.uniform((0, 0), image_px), rng.random()
-        if len(boxes) and choice < 0.6:
+        if len(boxes) and choice < 0.5:
             box = boxes[rng.integers(len(boxes))]
             middle = 0.5 * (box[:2] + box[2:]) + rng.uniform(-0.42, 0.42, 2) * part
         elif len(alikes) and choice < 0.9:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tools.train_detector.look_alikes import KINDS, SMALLEST_PX, faces
+from tools.train_detector.look_alikes import PATTERNS, PUZZLES, SMALLEST_PX, faces
 from tools.train_detector.textures import collage
 from vergence_sim.pictures import cube_faces
 from vergence_sim.scene import CUBE_SIDE_M, SceneBuilder
@@ -14,17 +14,19 @@ LOOK_ALIKES = 8
 class CrowdBuilder(SceneBuilder):
     """The simulator's room with more movable things in it."""
 
-    def populate(self) -> None:
+    def populate(self, puzzle_share: float) -> None:
         """Several cubes, each scrambled its own way, look-alikes of all kinds, and an occluder."""
         rng = self._rng
         half = CUBE_SIDE_M / 2
         self.smallest_px: list[float] = []  # of each look-alike, see SMALLEST_PX
+        self.puzzles: list[bool] = []
         for number in range(CUBES):
             self.wrap(f"cube{number}", cube_faces(rng))
             self._put(f"cube{number}", f'type="box" size="{half} {half} {half}"', f"cube{number}")
         for number in range(LOOK_ALIKES):
             name = f"alike{number}"
-            kind = str(rng.choice(list(KINDS)))
+            kind = str(rng.choice(list(PUZZLES if rng.random() < puzzle_share else PATTERNS)))
+            self.puzzles.append(kind in PUZZLES)
             self.smallest_px.append(SMALLEST_PX[kind])
             self.wrap(name, faces(rng, kind))
             if rng.random() < 0.75:

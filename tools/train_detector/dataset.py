@@ -34,17 +34,32 @@ def shard_path(folder: Path, seed: int) -> Path:
     return folder / f"world_{seed:07d}.npz"
 
 
-def render_world(seed: int, views: int, target_share: float, more_share: float) -> Shard:
-    """Render one world; see `Stage.views` for the shares."""
+@dataclass(frozen=True)
+class Content:
+    """What renders hold: the share with a cube, of these the share with each further one, of puzzles in look-alikes."""
+
+    targets: float
+    more: float
+    puzzles: float
+
+
+TRAINING = Content(0.75, 0.5, 0.4)
+"""Dense, for what a render costs, and rich in what is hard."""
+
+HELD_OUT = Content(0.5, 0.15, 0.2)
+
+
+def render_world(seed: int, views: int, content: Content) -> Shard:
+    """Render one world."""
     from tools.train_detector.scenes import Stage
 
-    stage = Stage(seed)
+    stage = Stage(seed, puzzle_share=content.puzzles)
     try:
         images = np.empty((views, SOURCE_PX[1], SOURCE_PX[0], 3), np.uint8)
         boxes, alikes = np.zeros((views, MOST, 4), np.float32), np.full((views, _MOST_ALIKES, 2), np.nan, np.float32)
         count, visible = np.zeros(views, np.int64), np.zeros((views, MOST), np.float32)
         cut = np.zeros((views, MOST), bool)
-        for i, view in enumerate(stage.views(views, target_share, more_share)):
+        for i, view in enumerate(stage.views(views, content.targets, content.more)):
             n = len(view.boxes_px)
             images[i], count[i], boxes[i, :n] = view.image, n, view.boxes_px + 0.5
             visible[i, :n], cut[i, :n] = view.visible, view.cut
@@ -54,21 +69,14 @@ def render_world(seed: int, views: int, target_share: float, more_share: float) 
     return Shard(list(images), boxes, count, visible, cut, alikes)
 
 
-def make(
-    folder: Path,
-    seeds: range,
-    views: int,
-    say: Callable[[str], None],
-    target_share: float = 0.75,
-    more_share: float = 0.15,
-) -> None:
+def make(folder: Path, seeds: range, views: int, content: Content, say: Callable[[str], None]) -> None:
     """Render the worlds of `seeds` that are not there yet."""
     folder.mkdir(parents=True, exist_ok=True)
     for done, seed in enumerate(seeds):
         path = shard_path(folder, seed)
         if path.exists():
             continue
-        shard = render_world(seed, views, target_share, more_share)
+        shard = render_world(seed, views, content)
         part = path.with_suffix(".part")
         with part.open("wb") as file:
             np.savez(file, **vars(shard))

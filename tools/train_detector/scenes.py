@@ -53,7 +53,8 @@ class StereoView:
 class Stage:
     """One world, from its seed; `view` gives renders from random places, the same for the same seed."""
 
-    def __init__(self, seed: int, samples: int | None = None) -> None:
+    def __init__(self, seed: int, samples: int | None = None, puzzle_share: float = 0.2) -> None:
+        """Build it; `puzzle_share` of the look-alikes are puzzles of another number of cells."""
         self._rng = np.random.default_rng([seed, 7])
         rig = default_rig()
         self._focal_px = _FOCAL_PX
@@ -61,10 +62,10 @@ class Stage:
         builder.room()
         builder.furniture()
         builder.targets()
-        builder.populate()
+        builder.populate(puzzle_share)
         builder.head(2 * np.arctan(0.5 * HEIGHT_PX / _FOCAL_PX), {"left": (0.0, 0.0), "right": (0.0, 0.0)})
         self._model = builder.compile(WIDTH_PX, HEIGHT_PX, 1.0)
-        self._smallest_px = builder.smallest_px
+        self._smallest_px, self._puzzles = builder.smallest_px, builder.puzzles
         self._data = mujoco.MjData(self._model)
         self._base = self._model.body("rig_base").pos.copy()
         self._light = (
@@ -111,7 +112,7 @@ class Stage:
             place = self._world_of(rng.uniform(80, 560), row + rng.uniform(-12, 12), depth)
             self._set(f"cube{number}", place if number < cubes else _HIDDEN, _any_rotation(rng))
         for number in range(LOOK_ALIKES):
-            self._place(f"alike{number}", rng.random() < 0.2, _width_px(rng, self._smallest_px[number]))
+            self._place_alike(number, rng.random() < 0.2)
         self._set("marker", _HIDDEN)
         self._set("board", _HIDDEN)
         self._set_light(float(rng.uniform(0.6, 1.2)))
@@ -140,7 +141,7 @@ class Stage:
         alikes = []
         for number in range(LOOK_ALIKES):
             shown = rng.random() < 0.35
-            place = self._place(f"alike{number}", shown, _width_px(rng, self._smallest_px[number]))
+            place = self._place_alike(number, shown)
             if place is not None:
                 alikes.append(place)
         self._place("marker", rng.random() < 0.15, rng.uniform(10, 60))
@@ -182,14 +183,19 @@ class Stage:
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_camlight(self._model, data)
 
-    def _place(self, name: str, shown: bool, width_px: float) -> tuple[float, float] | None:
-        """Put a thing where a cube would be `width_px` wide in half-size images, anywhere in the view."""
+    def _place_alike(self, number: int, shown: bool) -> tuple[float, float] | None:
+        """Put a look-alike somewhere; a puzzle whole, since of one that is cut nobody can count the cells."""
+        width_px = _width_px(self._rng, self._smallest_px[number])
+        return self._place(f"alike{number}", shown, width_px, 2.0 * width_px if self._puzzles[number] else 0.0)
+
+    def _place(self, name: str, shown: bool, width_px: float, margin_px: float = 0.0) -> tuple[float, float] | None:
+        """Put a thing where a cube would be `width_px` wide in half-size images, its middle off the border."""
         rng = self._rng
         if not shown:
             self._set(name, _HIDDEN)
             return None
         depth = CUBE_SIDE_M * 0.5 * self._focal_px / width_px
-        u, v = rng.uniform(0, WIDTH_PX), rng.uniform(0, HEIGHT_PX)
+        u, v = rng.uniform(margin_px, WIDTH_PX - margin_px), rng.uniform(margin_px, HEIGHT_PX - margin_px)
         self._set(name, self._world_of(u, v, depth), _any_rotation(rng))
         return u, v
 
