@@ -93,9 +93,12 @@ def start(domain_id: int) -> Iterator[Start]:
     executor = SingleThreadedExecutor(context=context)
     nodes: list[Node] = []
 
+    ending = threading.Event()
+
     def spin() -> None:
         try:
-            executor.spin()
+            while not ending.is_set():
+                executor.spin_once(timeout_sec=0.1)
         except ExternalShutdownException:
             return
 
@@ -107,8 +110,9 @@ def start(domain_id: int) -> Iterator[Start]:
     thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     yield begin
+    ending.set()  # first the thread: an executor that is shut down under it fails in the middle of its waiting
+    thread.join(60)
     executor.shutdown()
-    thread.join(10)
     for node in nodes:
         node.destroy_node()
     context.try_shutdown()

@@ -104,17 +104,21 @@ def inverter(domain_id: int) -> Iterator[None]:
     node, executor = Inverter(context), SingleThreadedExecutor(context=context)
     executor.add_node(node)
 
+    ending = threading.Event()
+
     def spin() -> None:
         try:
-            executor.spin()
+            while not ending.is_set():
+                executor.spin_once(timeout_sec=0.1)
         except ExternalShutdownException:
             return
 
     thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     yield
+    ending.set()  # first the thread: an executor that is shut down under it fails in the middle of its waiting
+    thread.join(60)
     executor.shutdown()
-    thread.join(10)
     node.destroy_node()
     context.try_shutdown()
 

@@ -47,6 +47,7 @@ class RunningHead:
                 CameraInfo, f"{eye}/camera_info", lambda message, eye=eye: self._infos.update({eye: message}), IMAGE_QOS
             )
         self.node.create_timer(REPEAT_S, self._tell)
+        self._ending = threading.Event()
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, name=name, daemon=True)
@@ -58,8 +59,10 @@ class RunningHead:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        # first the thread: an executor that is shut down under it fails in the middle of its waiting
+        self._ending.set()
+        self._thread.join(timeout=10.0)
         self._executor.shutdown(timeout_sec=1.0)
-        self._thread.join(timeout=2.0)
         self.node.destroy_node()
         rclpy.try_shutdown()
 
@@ -117,6 +120,7 @@ class RunningHead:
 
     def _spin(self) -> None:
         try:
-            self._executor.spin()
+            while not self._ending.is_set():
+                self._executor.spin_once(timeout_sec=0.1)
         except ExternalShutdownException:
             return
