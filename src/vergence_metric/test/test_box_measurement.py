@@ -148,6 +148,48 @@ def test_refinement_of_a_slanted_thing_is_its_mean():
     assert found.horizontal_px == pytest.approx(6.0 / 1.06, abs=0.05)
 
 
+def test_refinement_follows_a_face_that_one_eye_sees_much_narrower():
+    left = textured(5)
+    # In the right image a front face up to x = 160, beyond it a side face of which the left eye sees a half.
+    right = shifted(left, lambda x, y: np.where(x < 160, 4.0, 4.0 - 0.5 * (x - 160)))
+    found = refine(
+        np.clip(left, 0, 255).astype(np.uint8),
+        right,
+        Box((104, 80, 174, 160), 0.9, 0, "c"),
+        Box((100, 80, 180, 160), 0.9, 0, "c"),
+    )
+    # Both images' pixels count: the right one's 60 and 20 columns, the left one's 60 and 10.
+    values = [*np.full(60, 4.0), *(4.0 - 0.5 * np.arange(0.5, 20)), *np.full(60, 4.0), *(4.0 - np.arange(0.5, 10))]
+    assert found.horizontal_px == pytest.approx(np.mean(values), abs=0.15)
+
+
+def test_refinement_leaves_the_background_out():
+    left = textured(6)
+    # A disc of disparity 12 before a wall of -8, in boxes whose corners show the wall.
+    right = shifted(left, lambda x, y: np.where((x - 148) ** 2 + (y - 120) ** 2 < 40**2, 12.0, -8.0))
+    found = refine(
+        np.clip(left, 0, 255).astype(np.uint8),
+        right,
+        Box((120, 80, 200, 160), 0.9, 0, "c"),
+        Box((108, 80, 188, 160), 0.9, 0, "c"),
+    )
+    assert found.horizontal_px == pytest.approx(12.0, abs=0.1)
+    assert 0.6 < found.confidence < 0.95
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.integers(-20, 20), st.integers(-5, 5))
+def test_refinement_of_a_moved_picture_moves_with_it(across, down):
+    left = np.clip(textured(7), 0, 255).astype(np.uint8)
+    right = shifted(textured(7), lambda x, y: 3.3 + 0.03 * (x - 160))
+    moved = np.roll(right, (-down, -across), (0, 1))
+    box, other = Box((120, 80, 200, 160), 0.9, 0, "c"), Box((116, 80, 196, 160), 0.9, 0, "c")
+    shifted_box = Box((116 - across, 80 - down, 196 - across, 160 - down), 0.9, 0, "c")
+    still, after = refine(left, right, box, other), refine(left, moved, box, shifted_box)
+    assert after.horizontal_px - still.horizontal_px == pytest.approx(across, abs=1e-3)
+    assert after.vertical_px - still.vertical_px == pytest.approx(down, abs=1e-3)
+
+
 def test_refinement_says_why_not():
     left, box = np.clip(textured(3), 0, 255).astype(np.uint8), Box((120, 80, 200, 160), 0.9, 0, "c")
     other = np.clip(textured(4), 0, 255).astype(np.uint8)
