@@ -139,7 +139,8 @@ def _batches(
             strength = Strength(0.0, 0.0) if plain else Strength()
             chosen = order[start : start + (schedule.crop_batch if cropped else schedule.batch)]
             start += len(chosen)
-            if start >= len(order):
+            # A smaller batch at the end is left out, unless it is all there is.
+            if start >= len(order) and start > len(chosen):
                 break
             yield _batch(rng, data, chosen, strength, CROP_PX if cropped else None)
 
