@@ -31,11 +31,14 @@ WALL = texture(1, (900, 1400), (2.0, 5.0, 12.0))
 TARGET, OTHER = texture(2, (96, 96), (3.0, 6.0)), texture(3, (96, 96), (3.0, 6.0))
 
 
-def board(image, surface, center_m, size_m, left, eyes):
-    """Draw a board that faces the head; `size_m` is (width, height)."""
+def board(image, surface, center_m, size_m, left, eyes, slant_rad=0.0):
+    """Draw a board that faces the head, its right side turned away by `slant_rad`; `size_m` is (width, height)."""
     pan = eyes.pan_left_rad if left else eyes.pan_right_rad
     per_px = np.array(size_m) / (surface.shape[1], surface.shape[0])
-    right, down = np.array([0.0, -per_px[0], 0.0]), np.array([0.0, 0.0, -per_px[1]])
+    right, down = (
+        per_px[0] * np.array([math.sin(slant_rad), -math.cos(slant_rad), 0.0]),
+        np.array([0.0, 0.0, -per_px[1]]),
+    )
     corner = np.array(center_m) - right * (surface.shape[1] - 1) / 2 - down * (surface.shape[0] - 1) / 2
     columns = np.column_stack([right, down, corner - eye_position(left, RIG.baseline_m)])
     homography = K @ rotation_rig_from_optical(pan, eyes.tilt_rad).T @ columns
@@ -58,12 +61,12 @@ class Stage:
         self.frame, self.rng = 0, np.random.default_rng(0)
         self.tracks, self.errors = [], []
 
-    def show(self, target_m, eyes, occluder_m=None, covered=()):
+    def show(self, target_m, eyes, occluder_m=None, covered=(), slant_rad=0.0):
         images = []
         for left in (True, False):
             image = np.full((480, 640), 90, np.float32)
             board(image, WALL, (3.0, 0.0, 0.0), (7.0, 4.5), left, eyes)
-            board(image, TARGET, target_m, (0.06, 0.06), left, eyes)
+            board(image, TARGET, target_m, (0.06, 0.06), left, eyes, slant_rad)
             if occluder_m is not None:
                 board(image, OTHER, occluder_m, (0.08, 0.08), left, eyes)
             if ("left" if left else "right") in covered:
@@ -115,6 +118,21 @@ def test_the_right_eye_may_be_parallel(stage):
     track = stage.lock(target, EyeAngles(eyes.pan_left_rad, eyes.pan_left_rad, eyes.tilt_rad))
     assert track.disparity_px == pytest.approx(539 * 0.065 / 0.35, rel=0.02)
     assert track.right_px[0] == pytest.approx(track.left_px[0] - track.disparity_px)
+
+
+def test_the_disparity_of_a_slanted_thing_is_that_of_the_point_that_was_looked_at(stage):
+    slant_rad, aside_m = math.radians(35.0), 0.012
+    step = aside_m * np.array([math.sin(slant_rad), -math.cos(slant_rad), 0.0])
+    center = np.array([0.35, 0.0, 0.0])
+    eyes = gaze(center + step)
+    for _ in range(20):
+        track = stage.show(center, eyes, slant_rad=slant_rad)
+    assert track.status is TrackStatus.OK, track.reason
+    # Its middle, where the track says that it is, has two pixels more of it.
+    truth = pixel(center, True, eyes) - pixel(center, False, eyes)
+    assert truth[0] > 1.9
+    assert abs(track.left_px[0] - pixel(center, True, eyes)[0]) < 3.0
+    assert track.disparity_px == pytest.approx(0.0, abs=0.4)
 
 
 @pytest.mark.parametrize("servo_step_deg", [0.0, 1.0])

@@ -23,6 +23,7 @@ class Target:
     direction: np.ndarray  # unit vector in rig_base when last seen
     velocity: np.ndarray  # of that vector, per second
     bounded: bool  # its region was told from what is around
+    aside_px: Pixel = (0.0, 0.0)  # of its region's centre, when locked on: where the eye looked
     hidden: bool = False
     right_seen_s: float = -math.inf
     absolute_rad: float = math.nan  # angle by which the right ray is turned against the left one, across
@@ -43,6 +44,11 @@ class Target:
             keep = _MOTION_MEMORY if not self.hidden else 0.0
             self.velocity = keep * self.velocity + (1.0 - keep) * velocity if not self.hidden else self.velocity * 0.0
         self.direction, self.seen_s, self.hidden = direction, stamp_s, False
+
+    def looked_at(self, center_px: Pixel) -> Pixel:
+        """Return the pixel of the point that the eye looked at when it locked on, for a centre now."""
+        scale = self.looks.scale
+        return center_px[0] + scale * self.aside_px[0], center_px[1] + scale * self.aside_px[1]
 
     def saw_right(self, stamp_s: float, left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> None:
         """Keep its parallax, the angle between the two eyes' rays, which changes slowly whatever the eyes do."""

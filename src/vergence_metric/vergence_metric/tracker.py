@@ -2,9 +2,10 @@
 
 When the eyes come to rest after a saccade, whatever lies at the left fovea is locked on: its region is what shares the
 fovea's disparity (zero-disparity filter), its looks are learnt. From then on sparse flow and templates follow it in the
-left image, wherever it goes, and the disparity estimator reads its disparity there. Looks and disparity must both go on
-as expected: something that passes in front has another disparity and is not followed; the target is then searched for
-about the direction it is predicted in until it shows again.
+left image, wherever it goes, and the disparity estimator reads the disparity of the point that was looked at: a solid
+thing near the head has others elsewhere. Looks and disparity must both go on as expected: something that passes in
+front has another disparity and is not followed; the target is then searched for about the direction it is predicted in
+until it shows again.
 """
 
 import math
@@ -137,6 +138,7 @@ class TargetTracker:
         looks = Appearance(left, point, extent or _USUAL_EXTENT_PX)
         direction = views[0].direction(point)
         self._target = Target(self._track_id, stamp_s, looks, stamp_s, direction, np.zeros(3), extent is not None)
+        self._target.aside_px = _aside(_fovea(left), point, extent)
         return self._tell(self._target, Sighting(point, 1.0, 0), disparity, views)
 
     def _segment(
@@ -148,9 +150,10 @@ class TargetTracker:
         region = self._region(left, right, point, disparity, views)
         if not region.found or region.touches_border:
             return point, None, disparity
-        at_center = self._estimator.estimate(left, right, region.centroid_px, disparity.horizontal_px)
-        if _plausible(at_center, disparity.horizontal_px, self._parameters.track_disparity_jump_px):
-            disparity = at_center
+        if _aside(point, region.centroid_px, region.extent_px) == (0.0, 0.0):
+            at_center = self._estimator.estimate(left, right, region.centroid_px, disparity.horizontal_px)
+            if _plausible(at_center, disparity.horizontal_px, self._parameters.track_disparity_jump_px):
+                disparity = at_center
         return region.centroid_px, region.extent_px, disparity
 
     def _region(
@@ -190,8 +193,11 @@ class TargetTracker:
         if sighting.likeness < needed or not _inside(sighting.pixel, left):
             target.hidden = True
             return self._lost(target, f"hidden for {hidden_s:.1f} s, best likeness {sighting.likeness:.2f}")
-        expected_d = target.expected_disparity(sighting.pixel, views)
-        disparity = self._estimator.estimate(left, right, sighting.pixel, expected_d)
+        looked_at = target.looked_at(sighting.pixel)
+        expected_d = target.expected_disparity(looked_at, views)
+        disparity = self._estimator.estimate(left, right, looked_at, expected_d)
+        if not disparity.ok and looked_at != sighting.pixel:
+            disparity = self._estimator.estimate(left, right, sighting.pixel, expected_d)
         if disparity.ok and expected_d is not None and target.disparity_age_s(stamp_s) < 0.5:
             jump = disparity.horizontal_px - expected_d
             # Servos without feedback are not where they say while they turn: looks that have not changed count more.
@@ -202,7 +208,8 @@ class TargetTracker:
             point, extent, disparity = self._segment(left, right, sighting.pixel, disparity, views)
             if extent is not None:
                 # It was locked on before the right eye saw it; now its bounds are known.
-                sighting, target.bounded = replace(sighting, pixel=point), True
+                target.aside_px, target.bounded = _aside(sighting.pixel, point, extent), True
+                sighting = replace(sighting, pixel=point)
                 target.looks = Appearance(left, point, extent)
                 target.moved(stamp_s, views[0].direction(point))
                 return self._tell(target, sighting, disparity, views)
@@ -215,7 +222,8 @@ class TargetTracker:
 
     def _tell(self, target: Target, sighting: Sighting, disparity: Disparity, views: tuple[EyeView, EyeView]) -> Track:
         """Return the track of a target that was seen in the left eye."""
-        expected_d = target.expected_disparity(sighting.pixel, views)
+        looked_at = target.looked_at(sighting.pixel)
+        expected_d = target.expected_disparity(looked_at, views)
         usable = _plausible(disparity, expected_d, self._parameters.track_disparity_jump_px)
         likeness = min(max((sighting.likeness - 0.3) / 0.6, 0.0), 1.0)
         scale = target.looks.scale
@@ -235,8 +243,9 @@ class TargetTracker:
         )
         if not usable:
             return seen
-        right_px = (sighting.pixel[0] - disparity.horizontal_px, sighting.pixel[1] - disparity.vertical_px)
-        target.saw_right(self._stamp_s, sighting.pixel, views, right_px)
+        shift = np.array([disparity.horizontal_px, disparity.vertical_px])
+        right_px = (sighting.pixel[0] - shift[0], sighting.pixel[1] - shift[1])
+        target.saw_right(self._stamp_s, looked_at, views, (looked_at[0] - shift[0], looked_at[1] - shift[1]))
         return replace(
             seen,
             right_px=right_px,
@@ -266,6 +275,13 @@ def _plausible(disparity: Disparity, expected_px: float | None, jump_px: float) 
         return True
     near = expected_px is not None and abs(disparity.horizontal_px - expected_px) <= min(jump_px, 4.0)
     return disparity.status is DisparityStatus.AMBIGUOUS and near
+
+
+def _aside(looked_at: Pixel, center: Pixel, extent_px: tuple[float, float] | None) -> Pixel:
+    """Return how far from a region's centre the eye looks; nothing if that is beyond the region."""
+    aside = (looked_at[0] - center[0], looked_at[1] - center[1])
+    inside = extent_px is not None and all(abs(a) <= 0.5 * e for a, e in zip(aside, extent_px, strict=True))
+    return aside if inside else (0.0, 0.0)
 
 
 def _fovea(image: Image) -> Pixel:
