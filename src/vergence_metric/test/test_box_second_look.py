@@ -80,7 +80,7 @@ def test_looks_are_bounded_and_the_rest_stays():
         seen.append(crop.shape)
         return nothing(crop)
 
-    boxes = np.tile([[10.0, 10, 50, 50]], (9, 1)) + np.arange(9)[:, None] * 45
+    boxes = np.tile([[10.0, 10, 50, 50]], (9, 1)) + 45.0 * np.arange(9)[:, None]
     _, scores = look_again(picture((0, 0, 4, 4)), boxes, np.full(9, 0.8), np.zeros(9, np.int64), count)
     assert seen == [(CROP_PX[1], CROP_PX[0], 3)] * (2 * MOST_LOOKS)
     assert scores.tolist() == [0.4] * MOST_LOOKS + [0.8] * (9 - MOST_LOOKS)
