@@ -41,7 +41,8 @@ def run(say: Callable[[str], None]) -> list[Row]:
     false_images = [len(shipped.detect(view.image)) for view in empty]
     found = sum(len(shipped.detect(view.image)) > 0 for view in with_target)
     say(f"{found} of {len(with_target)} renders with a cube have a detection at the shipped threshold")
-    latency_ms = _latency_ms(shipped, with_target[0])
+    once_ms = _latency_ms(Detector(DetectorParameters(second_look=False)), with_target)
+    twice_ms = _latency_ms(shipped, with_target)
     size = shipped.input_px
     like = "a network of YOLOv6-N's cost, bare"
     return [
@@ -49,7 +50,10 @@ def run(say: Callable[[str], None]) -> list[Row]:
         Row("detector.ap50_95.cube", mean_average_precision(whole), "share"),
         Row("detector.ap50_small.cube", average_precision(small, 0.5), "share"),
         Row("detector.false_positives", 1000.0 * sum(false_images) / len(empty), "per 1000 renders"),
-        Row("detector.latency_ms", latency_ms, "ms", like, _peer_latency_ms(size)),
+        Row("detector.latency_ms", once_ms, "ms", like, _peer_latency_ms(size)),
+        Row(
+            "detector.latency_second_look_ms", twice_ms, "ms", "as the node runs it: one look and closer ones", once_ms
+        ),
         Row("detector.model_mb", shipped.path.stat().st_size * 1e-6, "MB"),
     ]
 
@@ -75,11 +79,12 @@ def _result(view: View, found: "object", least_px: float, most_px: float) -> Ima
     return ImageResult(boxes, scores, view.boxes_px, ignored)
 
 
-def _latency_ms(detector: Detector, view: View) -> float:
+def _latency_ms(detector: Detector, views: list[View]) -> float:
     times = []
-    for _ in range(120):
+    for i in range(120):
+        image = views[i % len(views)].image
         started = time.perf_counter()
-        detector.detect(view.image)
+        detector.detect(image)
         times.append(time.perf_counter() - started)
     return float(np.median(times[20:]) * 1e3)
 

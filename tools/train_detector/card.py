@@ -22,6 +22,10 @@ def write_figures(card: Path, scores: Scores) -> None:
         f"| renders with a cube in which the best detection passes it | {scores.recall[threshold]:.3f} |",
         f"| false detections per 1000 renders without a cube, look-alikes in view | "
         f"{scores.false_per_1000[threshold]:.0f} |",
+        "",
+        "| threshold | cubes found | false per 1000 |",
+        "|---|---|---|",
+        *(f"| {t} | {scores.recall[t]:.3f} | {scores.false_per_1000[t]:.0f} |" for t in list(scores.recall)[4::4]),
         _END,
     ]
     text = card.read_text(encoding="utf-8")

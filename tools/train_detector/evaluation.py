@@ -17,7 +17,7 @@ SMALL_PX = (16.0, 32.0)
 _HARDLY_VISIBLE = 0.5
 _LEAST_PX = 12.0
 _THRESHOLDS = tuple(round(0.2 + 0.025 * i, 3) for i in range(29))
-_FALSE_PER_1000 = 5.0
+_FALSE_PER_1000, _LEAST_FOUND = 5.0, 0.95
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,13 @@ class Scores:
 
     @property
     def threshold(self) -> float:
-        """The lowest threshold with few enough false detections; the highest one tried where none has."""
-        good = [float(t) for t, false in self.false_per_1000.items() if false <= _FALSE_PER_1000]
-        return min(good, default=max(_THRESHOLDS))
+        """The lowest threshold with few enough false detections, unless that would miss too many cubes.
+
+        Then it is the highest one that still finds enough of them.
+        """
+        few_false = [float(t) for t, false in self.false_per_1000.items() if false <= _FALSE_PER_1000]
+        enough_found = [float(t) for t, found in self.recall.items() if found >= _LEAST_FOUND]
+        return min(min(few_false, default=max(_THRESHOLDS)), max(enough_found, default=min(_THRESHOLDS)))
 
     def as_json(self) -> str:
         """Return the figures as JSON."""

@@ -9,7 +9,7 @@ from torch.nn import functional
 from tools.train_detector.assignment import Assignment
 
 _FOCUS = 2.0
-_NEGATIVE_WEIGHT = 1.5
+_NEGATIVE_WEIGHT = 4.0
 _GIOU_WEIGHT = 2.5
 _L1_WEIGHT = 2.0
 
