@@ -13,7 +13,8 @@ from vergence_common.domains import own_domain
 from vergence_common.qos import STATE_QOS
 from vergence_msgs.msg import BoxVergence, EdgeVergence
 
-WARM_UP_S = 8.0
+READY_WITHIN_S = 90.0
+SETTLED_S = 5.0
 COUNTED_S = 25.0
 _GRAPH = (
     ("vergence_sim", "sim_node"),
@@ -52,7 +53,12 @@ def _count(domain: int) -> tuple[dict[str, int], dict[int, int]]:
     node.create_subscription(BoxVergence, "vergence/box", on_box, STATE_QOS)
     node.create_subscription(EdgeVergence, "vergence/edge", on_edge, STATE_QOS)
     try:
-        _spin(executor, WARM_UP_S)
+        started_s = time.monotonic()
+        while not (counts["box"] and counts["edge"]):
+            if time.monotonic() - started_s > READY_WITHIN_S:
+                raise RuntimeError(f"no {'box' if counts['edge'] else 'edge'} metric within {READY_WITHIN_S:g} s")
+            executor.spin_once(timeout_sec=0.1)
+        _spin(executor, SETTLED_S)
         counts.update(box=0, edge=0)
         statuses.clear()
         _spin(executor, COUNTED_S)
