@@ -17,7 +17,7 @@ SMALL_PX = (16.0, 32.0)
 _HARDLY_VISIBLE = 0.5
 _LEAST_PX = 12.0
 _THRESHOLDS = tuple(round(0.2 + 0.025 * i, 3) for i in range(29))
-_FALSE_PER_1000, _LEAST_FOUND = 5.0, 0.95
+_FALSE_PER_1000, _LEAST_FOUND = 5.0, 0.90
 
 
 @dataclass(frozen=True)
