@@ -94,6 +94,20 @@ def test_what_the_boxes_hold_settles_it():
     assert same > 0.95
 
 
+def test_two_alike_things_of_which_each_eye_misses_one_are_no_pair():
+    rng = np.random.default_rng(4)
+    one, other = (rng.integers(0, 255, (6, 6, 3), np.uint8).repeat(10, 0).repeat(10, 1) for _ in range(2))
+    left, right = box(300, 200), box(270, 201)
+    images = [np.full((480, 640, 3), 120, np.uint8) for _ in range(2)]
+    images[0][171:231, 271:331] = one
+    images[1][172:232, 241:301] = other
+    assert associate([left], [right], P).pairs
+    found = associate([left], [right], P, 0.0, (images[0], images[1]))
+    assert (found.pairs, found.left_only, found.right_only) == ((), (left,), (right,))
+    images[1][172:232, 241:301] = one
+    assert associate([left], [right], P, 0.0, (images[0], images[1])).pairs
+
+
 def test_nothing_lies_beyond_infinity():
     parallel = geometry()
     assert parallel.parallel_px((300.0, 200.0)) == pytest.approx(0.0, abs=1e-9)

@@ -99,6 +99,13 @@ class BoxMetricParameters(Parameters):
     pair_disparity_px: float = parameter(
         320.0, "largest disparity of one object, either way", unit="px", minimum=10.0, maximum=4000.0
     )
+    pair_misfit: float = parameter(
+        30.0,
+        "boxes that fit worse than this in place, size, score and looks are not one object's "
+        "[standard deviations squared, summed]",
+        minimum=1.0,
+        maximum=1000.0,
+    )
     pair_margin: float = parameter(
         1.5,
         "the best pair must be better than one that shares a box with it by this [standard deviations squared]",

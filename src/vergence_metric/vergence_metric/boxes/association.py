@@ -74,7 +74,7 @@ def associate(
 
     """
     signatures: tuple[list[Any], list[Any]] = ([None] * len(left), [None] * len(right))
-    if images is not None and (len(left) > 1 or len(right) > 1):
+    if images is not None:
         signatures = ([signature(images[0], box) for box in left], [signature(images[1], box) for box in right])
     costs = np.full((len(left), len(right)), math.inf)
     for i, a in enumerate(left):
@@ -83,7 +83,9 @@ def associate(
             if math.isfinite(cost):
                 cost += _discontinuity(a, b, expected, parameters.follow_gate_px)
                 alike = likeness(signatures[0][i], signatures[1][j])
-                costs[i, j] = cost + (0.0 if alike is None else ((1.0 - alike) / _UNLIKE_SIGMA) ** 2)
+                cost += 0.0 if alike is None else ((1.0 - alike) / _UNLIKE_SIGMA) ** 2
+                # Where each eye misses one of two alike things, what is left is no pair.
+                costs[i, j] = cost if cost <= parameters.pair_misfit else math.inf
     chosen = _best_together(costs)
     pairs = []
     for i, j in chosen:
