@@ -100,7 +100,7 @@ class BoxMetricParameters(Parameters):
         320.0, "largest disparity of one object, either way", unit="px", minimum=10.0, maximum=4000.0
     )
     pair_misfit: float = parameter(
-        30.0,
+        24.0,
         "boxes that fit worse than this in place, size, score and looks are not one object's "
         "[standard deviations squared, summed]",
         minimum=1.0,
