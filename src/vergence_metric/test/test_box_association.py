@@ -96,7 +96,8 @@ def test_what_the_boxes_hold_settles_it():
 
 def test_two_alike_things_of_which_each_eye_misses_one_are_no_pair():
     rng = np.random.default_rng(4)
-    one, other = (rng.integers(0, 255, (6, 6, 3), np.uint8).repeat(10, 0).repeat(10, 1) for _ in range(2))
+    one = rng.integers(0, 255, (6, 6, 3), np.uint8).repeat(10, 0).repeat(10, 1)
+    other = one[::-1, ::-1, ::-1]
     left, right = box(300, 200), box(270, 201)
     images = [np.full((480, 640, 3), 120, np.uint8) for _ in range(2)]
     images[0][171:231, 271:331] = one
