@@ -144,7 +144,7 @@ class BoxMetricNodeParameters(BoxMetricParameters, DetectorParameters, StereoPar
 
     enable: bool = parameter(True, "whether pairs are measured at all")
     rate_hz: float = parameter(
-        15.0,
+        12.0,
         "pairs measured a second at most, so that the rest of the graph keeps its cores",
         unit="Hz",
         minimum=0.1,
