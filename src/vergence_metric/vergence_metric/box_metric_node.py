@@ -1,13 +1,11 @@
 """box_metric_node: pairs of images in, the target's boxes in both eyes, metric II and the target's place out."""
 
-import traceback
 from collections.abc import Sequence
 from typing import Any
 
 import cv2
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
@@ -17,7 +15,6 @@ from vergence_common.images import array_to_image
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
-from vergence_common.stamps import to_nanoseconds
 from vergence_metric.box_messages import (
     box_vergence_message,
     detections_message,
@@ -27,17 +24,16 @@ from vergence_metric.box_messages import (
 )
 from vergence_metric.box_parameters import BoxMetricNodeParameters
 from vergence_metric.boxes import BoxMeasurement, BoxVergenceResult, DetectorError, draw
-from vergence_metric.joint_history import JointHistory
 from vergence_metric.latest_worker import LatestWorker
-from vergence_metric.stage_times import StageTimes
+from vergence_metric.pair_node import PairNode
 from vergence_metric.stereo_messages import ImagePair, StereoInput
 from vergence_msgs.msg import BoxVergence, StereoDetections
-from vergence_rig.rig import default_rig, load_rig
+from vergence_rig.rig import load_rig
 
 EYES = ("left", "right")
 
 
-class BoxMetricNode(Node):
+class BoxMetricNode(PairNode):
     """Measures the newest pair, at most `rate_hz` times a second, on a thread of its own."""
 
     def __init__(self, **options: Any) -> None:
@@ -45,12 +41,9 @@ class BoxMetricNode(Node):
         self._settings = declare(self, BoxMetricNodeParameters)
         settings: BoxMetricNodeParameters = self._settings.value
         cv2.setNumThreads(settings.threads or -1)
-        rig = load_rig(settings.rig) if settings.rig else default_rig()
+        rig = load_rig(settings.rig)
         self._measurement = BoxMeasurement(settings, rig.baseline_m)
         self.get_logger().info(self._measurement.detector.describe())
-        self._joints = JointHistory()
-        self._times = StageTimes()
-        self._failure: str | None = None
         self._counts: dict[str, int] = {}
         self._due_ns = 0
         diagnostics = Diagnostics(self)
@@ -70,10 +63,6 @@ class BoxMetricNode(Node):
         self._settings.on_change(self._on_settings)
         diagnostics.add("detector", self._report)
 
-    def close(self) -> None:
-        """End the measuring thread."""
-        self._worker.close()
-
     def _refuse_unknown_classes(self, changes: list[Parameter]) -> SetParametersResult:
         wanted = next((tuple(c.value or ()) for c in changes if c.name == "classes"), ())
         try:
@@ -85,9 +74,6 @@ class BoxMetricNode(Node):
     def _on_settings(self, settings: ParameterSet) -> None:
         cv2.setNumThreads(settings.value.threads or -1)
         self._stereo.set_parameters(settings.value)
-
-    def _on_joints(self, message: JointState) -> None:
-        self._joints.add(to_nanoseconds(message.header.stamp), message.name, message.position)
 
     def _on_pair(self, pair: ImagePair) -> None:
         settings: BoxMetricNodeParameters = self._settings.value
@@ -130,13 +116,6 @@ class BoxMetricNode(Node):
             with self._times.measure("overlay"):
                 picture = draw(pair.left.pixels, pair.right.pixels, result)
                 self._overlay_publisher.publish(array_to_image(picture, header))
-
-    def _on_failure(self, error: Exception) -> None:
-        if not self.context.ok():
-            return  # the node is ending: nothing can be published any more
-        self._failure = f"{type(error).__name__}: {error}"
-        text = "".join(traceback.format_exception(error))
-        self.get_logger().error(f"a pair could not be measured:\n{text}", throttle_duration_sec=10.0)
 
     def _report(self) -> Report:
         values: dict[str, object] = {"model": self._measurement.detector.describe()}

@@ -1,12 +1,10 @@
 """edge_metric_node: pairs of images in, metric I, the signed error of the fovea and the followed target out."""
 
-import traceback
 from collections.abc import Sequence
 from time import monotonic_ns
 from typing import Any
 
 import cv2
-from rclpy.node import Node
 from sensor_msgs.msg import Image, JointState
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
@@ -14,22 +12,20 @@ from vergence_common.images import array_to_image
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
-from vergence_common.stamps import to_nanoseconds
 from vergence_metric.edge_metric import EdgeMetricResult
 from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
-from vergence_metric.joint_history import JointHistory
 from vergence_metric.latest_worker import LatestWorker
 from vergence_metric.metric_messages import edge_message, error_message, track_message
 from vergence_metric.overlay import draw_overlay
 from vergence_metric.pair_measurement import Models, PairMeasurement
-from vergence_metric.stage_times import StageTimes
+from vergence_metric.pair_node import PairNode
 from vergence_metric.stereo_messages import ImagePair, StereoInput
 from vergence_metric.viewing_angles import angular_disparity
 from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
-from vergence_rig.rig import default_rig, load_rig
+from vergence_rig.rig import load_rig
 
 
-class EdgeMetricNode(Node):
+class EdgeMetricNode(PairNode):
     """Measures the newest pair on a thread of its own; the executor's thread only takes images and pairs them."""
 
     def __init__(self, **options: Any) -> None:
@@ -37,10 +33,7 @@ class EdgeMetricNode(Node):
         self._settings = declare(self, EdgeMetricNodeParameters)
         settings: EdgeMetricNodeParameters = self._settings.value
         cv2.setNumThreads(settings.threads or -1)
-        self._measurement = PairMeasurement(settings, load_rig(settings.rig) if settings.rig else default_rig())
-        self._joints = JointHistory()
-        self._times = StageTimes()
-        self._failure: str | None = None
+        self._measurement = PairMeasurement(settings, load_rig(settings.rig))
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
         self._edge_publisher = qos.create_publisher(EdgeVergence, "vergence/edge")
@@ -53,16 +46,9 @@ class EdgeMetricNode(Node):
         self._settings.on_change(self._on_settings)
         diagnostics.add("measurement", self._report)
 
-    def close(self) -> None:
-        """End the measuring thread."""
-        self._worker.close()
-
     def _on_settings(self, settings: ParameterSet) -> None:
         cv2.setNumThreads(settings.value.threads or -1)
         self._stereo.set_parameters(settings.value)
-
-    def _on_joints(self, message: JointState) -> None:
-        self._joints.add(to_nanoseconds(message.header.stamp), message.name, message.position)
 
     def _measure(self, pair: ImagePair) -> None:
         self._measurement.set_parameters(self._settings.value)
@@ -96,13 +82,6 @@ class EdgeMetricNode(Node):
             track = self._measurement.track(edge, pair.left_stamp_ns * 1e-9, eyes, models)
         angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
         self._track_publisher.publish(track_message(track, edge, angular, pair.left.header, pair.skew_ns * 1e-9))
-
-    def _on_failure(self, error: Exception) -> None:
-        if not self.context.ok():
-            return  # shut down while a pair was being measured
-        self._failure = f"{type(error).__name__}: {error}"
-        text = "".join(traceback.format_exception(error))
-        self.get_logger().error(f"a pair could not be measured:\n{text}", throttle_duration_sec=10.0)
 
     def _report(self) -> Report:
         worked, dropped = self._worker.worked, self._worker.dropped

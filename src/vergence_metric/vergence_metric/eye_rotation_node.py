@@ -1,32 +1,28 @@
 """eye_rotation_node: pairs of images in, how the eyes really stand to one another out, a few times a second."""
 
-import traceback
 from collections.abc import Sequence
 from typing import Any
 
 import cv2
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
-from vergence_common.stamps import to_nanoseconds
 from vergence_metric.eye_rotation.encoder import VisualEncoder
 from vergence_metric.eye_rotation.pair_choice import PairChoice
 from vergence_metric.eye_rotation.resting_pairs import measure_pair
 from vergence_metric.eye_rotation_parameters import EyeRotationNodeParameters
-from vergence_metric.joint_history import JointHistory
 from vergence_metric.latest_worker import LatestWorker
 from vergence_metric.metric_messages import eye_rotation_message
-from vergence_metric.stage_times import StageTimes
+from vergence_metric.pair_node import PairNode
 from vergence_metric.stereo_messages import ImagePair, StereoInput
 from vergence_msgs.msg import EyeRotation
-from vergence_rig.rig import default_rig, load_rig
+from vergence_rig.rig import load_rig
 
 
-class EyeRotationNode(Node):
+class EyeRotationNode(PairNode):
     """Measures two pairs in a row, `rate_hz` times a second, on a thread of its own; the first tells of motion only."""
 
     def __init__(self, **options: Any) -> None:
@@ -34,12 +30,9 @@ class EyeRotationNode(Node):
         self._settings = declare(self, EyeRotationNodeParameters)
         settings: EyeRotationNodeParameters = self._settings.value
         cv2.setNumThreads(settings.threads or -1)
-        self._rig = load_rig(settings.rig) if settings.rig else default_rig()
+        self._rig = load_rig(settings.rig)
         self._encoder = VisualEncoder(settings, self._rig)
         self._choice: PairChoice[ImagePair] = PairChoice(settings.rate_hz)
-        self._joints = JointHistory()
-        self._times = StageTimes()
-        self._failure: str | None = None
         self._counts: dict[str, int] = {}
         self._last = "nothing measured yet"
         diagnostics = Diagnostics(self)
@@ -53,19 +46,12 @@ class EyeRotationNode(Node):
         self._settings.on_change(self._on_settings)
         diagnostics.add("encoder", self._report)
 
-    def close(self) -> None:
-        """End the measuring thread."""
-        self._worker.close()
-
     def _on_settings(self, settings: ParameterSet) -> None:
         values: EyeRotationNodeParameters = settings.value
         cv2.setNumThreads(values.threads or -1)
         self._encoder = VisualEncoder(values, self._rig)
         self._choice.rate_hz = values.rate_hz
         self._stereo.set_parameters(values)
-
-    def _on_joints(self, message: JointState) -> None:
-        self._joints.add(to_nanoseconds(message.header.stamp), message.name, message.position)
 
     def _on_pair(self, pair: ImagePair) -> None:
         two = self._choice.take(pair.left_stamp_ns, pair)
@@ -81,13 +67,6 @@ class EyeRotationNode(Node):
         self._last = reading.reason or "measured"
         self._publisher.publish(eye_rotation_message(reading, pair.left.header, pair.skew_ns * 1e-9))
         self._failure = None
-
-    def _on_failure(self, error: Exception) -> None:
-        if not self.context.ok():
-            return  # shut down while a pair was being measured
-        self._failure = f"{type(error).__name__}: {error}"
-        text = "".join(traceback.format_exception(error))
-        self.get_logger().error(f"a pair could not be measured:\n{text}", throttle_duration_sec=10.0)
 
     def _report(self) -> Report:
         values: dict[str, object] = {name.lower(): count for name, count in self._counts.items()}
