@@ -31,7 +31,7 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import from_nanoseconds
-from vergence_rig.rig import default_rig, load_rig
+from vergence_rig.rig import load_rig
 
 _LOOK_AROUND_NS = 200_000_000
 
@@ -176,7 +176,7 @@ class CameraNode(Node):
         return self._partner.report(own, settings.max_skew_s)
 
     def _size_in_rig(self, path: str, eye: str) -> tuple[int, int] | None:
-        rig = load_rig(path) if path else default_rig()
+        rig = load_rig(path)
         spec = {"left": rig.left_camera, "right": rig.right_camera}.get(eye)
         return None if spec is None else (spec.width_px, spec.height_px)
 

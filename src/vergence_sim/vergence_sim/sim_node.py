@@ -18,7 +18,7 @@ from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import to_stamp
 from vergence_msgs.msg import TrueBoxes, TrueVergence
-from vergence_rig.rig import JOINT_NAMES, default_rig, load_rig
+from vergence_rig.rig import JOINT_NAMES, load_rig
 from vergence_sim.head import CommandError
 from vergence_sim.parameters import SimParameters
 from vergence_sim.real_time import Event, Schedule
@@ -35,7 +35,7 @@ class SimNode(Node):
         super().__init__("sim_node", **options)
         settings = declare(self, SimParameters)
         parameters: SimParameters = settings.value
-        self._rig = load_rig(parameters.rig) if parameters.rig else default_rig()
+        self._rig = load_rig(parameters.rig)
         self._settings = parameters
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
