@@ -31,6 +31,7 @@ _SHEAR_FROM_PX = 8.0
 _REACH_PX = 24  # that a warped window may reach beyond its own size
 _FLOOR_PX = 0.01  # interpolation, and what no residual shows
 _BLOCK_PX = 7
+_SPARSE_FROM_PX = 16.0  # windows of this deviation or more: every second row and column of the blurred image is enough
 _MIXED_PX = 0.07  # what the model misses of surfaces that end or bend within sight, by scenes of the simulator
 _DRIFT_SHARE = 0.7  # what an answer moves by when its window grows, noise does not explain
 _PRIOR_SHEAR = 0.1  # standard deviation of slant and roll between the eyes
@@ -124,11 +125,12 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
 class _Window:
     """The left image about the point as a linear model: `design` (8, N) are the six affine increments, gain, offset.
 
-    `offsets` are u (1, n) and v (n, 1) from the point [px], `gradients` across and down (n, n), `roots` (N) those of
-    the weights, which sum to 1, `weighted` is their product with the design and `inverse` (8, 8) that of the normal
-    matrix.
+    Of its N = n x n samples, `stride_px` apart, `offsets` are u (1, n) and v (n, 1) from the point [px], `gradients`
+    across and down (n, n), `roots` (N) those of the weights, which sum to 1, `weighted` is their product with the
+    design and `inverse` (8, 8) that of the normal matrix.
     """
 
+    stride_px: int
     offsets: tuple[NDArray[np.floating], NDArray[np.floating]]
     gradients: tuple[NDArray[np.floating], NDArray[np.floating]]
     roots: Matrix
@@ -155,20 +157,26 @@ class _Window:
         """
         effect = self.roots * np.einsum("i,in->n", self.inverse[0], self.weighted) * residual
         effect = effect.reshape(self.gradients[0].shape)
-        blocks = cv2.boxFilter(effect, -1, (_BLOCK_PX, _BLOCK_PX), normalize=False, borderType=cv2.BORDER_CONSTANT)
-        return math.sqrt(float((blocks**2).sum())) / _BLOCK_PX
+        side = -(-_BLOCK_PX // self.stride_px)
+        blocks = cv2.boxFilter(effect, -1, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT)
+        return math.sqrt(float((blocks**2).sum())) / side
 
 
 def _linearised(left: Strip, point_px: tuple[float, float], sigma: float) -> _Window | None:
     """Return the window about the point as a linear model, None where it holds too little texture."""
-    radius = radius_of(sigma)
+    stride = 2 if sigma >= _SPARSE_FROM_PX else 1
+    offsets = np.arange(-(radius_of(sigma) // stride) * stride, radius_of(sigma) + 1, stride)
     x, y = round(point_px[0] - left.x0), round(point_px[1] - left.y0)
-    rows, columns = slice(y - radius, y + radius + 1), slice(x - radius, x + radius + 1)
-    patch = left.grey[rows, columns].astype(np.float64)
-    gx = 0.5 * (left.grey[rows, x - radius + 1 : x + radius + 2] - left.grey[rows, x - radius - 1 : x + radius])
-    gy = 0.5 * (left.grey[y - radius + 1 : y + radius + 2, columns] - left.grey[y - radius - 1 : y + radius, columns])
-    u = (np.arange(-radius, radius + 1) + (x + left.x0 - point_px[0]))[None, :]
-    v = (np.arange(-radius, radius + 1) + (y + left.y0 - point_px[1]))[:, None]
+    first, last = int(offsets[0]), int(offsets[-1])
+
+    def shifted(right: int, down: int) -> NDArray[np.floating]:
+        rows = slice(y + first + down, y + last + down + 1, stride)
+        return left.grey[rows, x + first + right : x + last + right + 1 : stride]
+
+    patch = shifted(0, 0).astype(np.float64)
+    gx, gy = 0.5 * (shifted(1, 0) - shifted(-1, 0)), 0.5 * (shifted(0, 1) - shifted(0, -1))
+    u = (offsets + (x + left.x0 - point_px[0]))[None, :]
+    v = (offsets + (y + left.y0 - point_px[1]))[:, None]
     across, down = np.exp(-0.5 * (u / sigma) ** 2), np.exp(-0.5 * (v / sigma) ** 2)
     roots = np.sqrt(down / down.sum()) * np.sqrt(across / across.sum())
     centred = patch - float((roots * roots * patch).sum())
@@ -187,7 +195,7 @@ def _linearised(left: Strip, point_px: tuple[float, float], sigma: float) -> _Wi
         inverse = np.linalg.inv(normal + np.diag(_damping(sigma)))
     except np.linalg.LinAlgError:
         return None
-    return _Window((u, v), (gx, gy), roots.ravel(), design, weighted, inverse)
+    return _Window(stride, (u, v), (gx, gy), roots.ravel(), design, weighted, inverse)
 
 
 def _damping(sigma: float) -> Matrix:
