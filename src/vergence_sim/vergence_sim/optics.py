@@ -87,7 +87,7 @@ class Sensor:
         self._right = right
         height, width = shape
         self._bank = rng.standard_normal((_NOISE_BANK, height, width, 3), dtype=np.float32)
-        self._noise: npt.NDArray[np.int16] | None = None
+        self._noise: tuple[Image, Image] | None = None
         self._noise_sigma = -1.0
         self._table: npt.NDArray[np.uint8] | None = None
         self._gains = (-1.0, -1.0, -1.0)
@@ -116,11 +116,18 @@ class Sensor:
 
     def _noisy(self, image: Image, sigma: float) -> Image:
         if sigma != self._noise_sigma:
-            self._noise = np.rint(self._bank * sigma).astype(np.int16)
+            levels = np.clip(np.rint(self._bank * sigma), -255, 255)
+            # What brightens and what darkens apart, as bytes, each field twice over: rolled by a slice, added at once.
+            brighter, darker = np.maximum(levels, 0), np.maximum(-levels, 0)
+            self._noise = _twice(brighter), _twice(darker)
             self._noise_sigma = sigma
         assert self._noise is not None
         # A whole new field for every frame would cost more than the rendering: a drawn one, rolled by a drawn shift.
-        field = self._noise[self._rng.integers(_NOISE_BANK)]
-        rows = int(self._rng.integers(image.shape[0]))
-        noise = np.concatenate([field[rows:], field[:rows]])
-        return np.asarray(cv2.add(image, noise, dtype=cv2.CV_8U), np.uint8)
+        field = int(self._rng.integers(_NOISE_BANK))
+        row = int(self._rng.integers(image.shape[0]))
+        brighter, darker = (part[field, row : row + image.shape[0]] for part in self._noise)
+        return np.asarray(cv2.subtract(cv2.add(image, brighter), darker), np.uint8)
+
+
+def _twice(fields: npt.NDArray[np.floating]) -> Image:
+    return np.tile(fields.astype(np.uint8), (1, 2, 1, 1))
