@@ -5,6 +5,17 @@ from collections.abc import Iterator
 import pytest
 
 from vergence_common.domains import own_domain
+from vergence_sim.renderer import RenderError
+from vergence_sim.simulator import Simulator
+
+
+@pytest.fixture(scope="session")
+def opengl() -> None:
+    """Skip where the simulator cannot render: no OpenGL library, no software one either."""
+    try:
+        Simulator().close()
+    except RenderError as error:
+        pytest.skip(f"no OpenGL here: {error}")
 
 
 @pytest.fixture

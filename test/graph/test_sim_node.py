@@ -12,19 +12,9 @@ from vergence_common.images import compressed_to_array, image_to_array
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_nanoseconds
 from vergence_msgs.msg import TrueBoxes, TrueVergence
-from vergence_sim.renderer import RenderError
 from vergence_sim.sim_node import SimNode
-from vergence_sim.simulator import Simulator
 
-pytestmark = pytest.mark.graph
-
-
-@pytest.fixture(scope="module", autouse=True)
-def opengl() -> None:
-    try:
-        Simulator().close()
-    except RenderError as error:
-        pytest.skip(f"no OpenGL here: {error}")
+pytestmark = [pytest.mark.graph, pytest.mark.usefixtures("opengl")]
 
 
 @pytest.fixture

@@ -19,20 +19,10 @@ from sensor_msgs.msg import JointState
 
 from vergence_bringup.processes import NodeCommand, ProcessGroup
 from vergence_rig.rig import load_rig
-from vergence_sim.renderer import RenderError
-from vergence_sim.simulator import Simulator
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.system, pytest.mark.timeout(400), pytest.mark.usefixtures("opengl")]
 
 SLOW_S = 0.12
-
-
-@pytest.fixture(autouse=True)
-def opengl() -> None:
-    try:
-        Simulator().close()
-    except RenderError as error:
-        pytest.skip(f"no OpenGL here: {error}")
 
 
 @pytest.fixture

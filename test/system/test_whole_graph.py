@@ -7,18 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from vergence_sim.renderer import RenderError
-from vergence_sim.simulator import Simulator
-
-pytestmark = pytest.mark.system
-
-
-@pytest.fixture(autouse=True)
-def opengl() -> None:
-    try:
-        Simulator().close()
-    except RenderError as error:
-        pytest.skip(f"no OpenGL here: {error}")
+pytestmark = [pytest.mark.system, pytest.mark.usefixtures("opengl")]
 
 
 @pytest.mark.timeout(240)
