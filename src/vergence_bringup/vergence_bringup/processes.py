@@ -85,7 +85,8 @@ class ProcessGroup:
     """Processes that live and end together; a context manager that ends them all on the way out.
 
     Each runs in a process group of its own, so that a Ctrl-C in the terminal reaches it only through `stop`, once; and
-    each asks the kernel for SIGTERM should this process die without a chance to stop it.
+    each asks the kernel for SIGTERM should this process die without a chance to stop it. They stay in one session, as
+    nodes of one launch do: Linux shares the cores evenly between sessions, whatever the niceness within them.
     """
 
     def __init__(self, log_dir: Path | None = None, extra_environment: Mapping[str, str] | None = None) -> None:
@@ -115,8 +116,7 @@ class ProcessGroup:
             stdout=output,
             stderr=subprocess.STDOUT if output else None,
             env=self._environment,
-            start_new_session=True,
-            preexec_fn=_die_with_parent,
+            preexec_fn=_lead_a_group_and_die_with_parent,
         )
 
     def check(self) -> None:
@@ -158,6 +158,7 @@ def _signal_group(pid: int, number: int) -> None:
         return
 
 
-def _die_with_parent() -> None:
+def _lead_a_group_and_die_with_parent() -> None:
+    os.setpgid(0, 0)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

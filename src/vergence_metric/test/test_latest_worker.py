@@ -1,5 +1,8 @@
+import os
+import sys
 import threading
 from collections.abc import Iterator
+from queue import SimpleQueue
 
 import pytest
 
@@ -81,3 +84,18 @@ def test_closing_finishes_the_item_at_hand_and_leaves_the_waiting_one() -> None:
     work.worker.close()
     assert work.done in ([1], [1, 2])  # 2 is cleared unless it was taken up before the call
     assert not work.worker.alive
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="threads have priorities of their own on Linux only")
+def test_nice_work_gives_way_and_the_submitter_does_not() -> None:
+    own = os.getpriority(os.PRIO_PROCESS, 0)
+    found: SimpleQueue[object] = SimpleQueue()
+    worker: LatestWorker[int] = LatestWorker(
+        lambda _: found.put(os.getpriority(os.PRIO_PROCESS, 0)), found.put, "test", niceness=7
+    )
+    try:
+        worker.submit(1)
+        assert found.get(timeout=60.0) == min(own + 7, 19)
+        assert os.getpriority(os.PRIO_PROCESS, 0) == own
+    finally:
+        worker.close()

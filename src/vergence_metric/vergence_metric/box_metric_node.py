@@ -56,7 +56,9 @@ class BoxMetricNode(PairNode):
         self._vision_publishers = [
             qos.create_publisher(vision, f"vergence/{eye}_detections") for eye in EYES if vision is not None
         ]
-        self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
+        self._worker: LatestWorker[ImagePair] = LatestWorker(
+            self._measure, self._on_failure, "measure", settings.niceness
+        )
         self._stereo = StereoInput(self, settings, diagnostics, qos, self._on_pair)
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self.add_on_set_parameters_callback(self._refuse_unknown_classes)

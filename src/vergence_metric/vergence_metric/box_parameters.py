@@ -150,6 +150,13 @@ class BoxMetricNodeParameters(BoxMetricParameters, DetectorParameters, StereoPar
         minimum=0.1,
         maximum=240.0,
     )
+    niceness: int = parameter(
+        10,
+        "how far detection gives way to other nodes that want the same core, as nice(1) means it",
+        minimum=0,
+        maximum=19,
+        read_only=True,
+    )
 
     def check(self) -> None:
         """Hold every part to its own rules."""

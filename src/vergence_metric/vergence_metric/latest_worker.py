@@ -1,5 +1,6 @@
 """One thread that works on the newest item only: what it could not reach in time is dropped and counted."""
 
+import os
 import threading
 import time
 from collections import deque
@@ -16,11 +17,15 @@ class LatestWorker(Generic[Item]):
     """Runs `work(item)` for the newest item submitted, one at a time, on a thread of its own.
 
     `submit` is for one thread, never waits for `work` and takes no lock that `work` could hold. An exception of `work`
-    goes to `on_error` and the next item is worked on.
+    goes to `on_error` and the next item is worked on. Threads of all processes that wait for a core go before this one
+    by `niceness`, as `nice` means it, beside the process's own.
     """
 
-    def __init__(self, work: Callable[[Item], None], on_error: Callable[[Exception], None], name: str) -> None:
+    def __init__(
+        self, work: Callable[[Item], None], on_error: Callable[[Exception], None], name: str, niceness: int = 0
+    ) -> None:
         self._work = work
+        self._niceness = niceness
         self._on_error = on_error
         self._newest: deque[Item] = deque(maxlen=1)
         self._wake: SimpleQueue[bool] = SimpleQueue()
@@ -59,6 +64,9 @@ class LatestWorker(Generic[Item]):
         self._thread.join(timeout_s)
 
     def _run(self) -> None:
+        if self._niceness:
+            # Linux knows priorities of threads: the node's other threads go on taking images at once.
+            os.setpriority(os.PRIO_PROCESS, 0, min(os.getpriority(os.PRIO_PROCESS, 0) + self._niceness, 19))
         while self._wake.get():
             try:
                 item = self._newest.popleft()
