@@ -17,6 +17,7 @@ Array = npt.NDArray[np.float64]
 
 _KEEP_S = 2.0
 _CLOCK_JUMP_S = 1.0
+_STILL = np.zeros(3)
 
 
 class JointHistory:
@@ -98,16 +99,18 @@ class JointHistory:
         """Return the reported angles (3,) at `stamp_s`, interpolated; the ends are held."""
         return self._at(self._reported, stamp_s)
 
-    def speed_within(self, begin_s: float, end_s: float) -> float:
-        """Return the fastest joint's greatest speed between two times [rad/s]; 0 where nothing is known."""
+    def speed_within(self, begin_s: float, end_s: float, along_rad_s: Array = _STILL) -> float:
+        """Return the fastest joint's greatest speed between two times [rad/s]; 0 where nothing is known.
+
+        With `along_rad_s` (3,) it is the speed beside these: how fast the eyes slip off a target that moves so.
+        """
         first = max(bisect_right(self._stamps, begin_s) - 1, 0)
         last = min(bisect_left(self._stamps, end_s), len(self._stamps) - 1)
         fastest = 0.0
         for i in range(first, last):
             duration_s = self._stamps[i + 1] - self._stamps[i]
-            fastest = max(
-                fastest, float(np.abs(self._reported[i + 1] - self._reported[i]).max()) / max(duration_s, 1e-4)
-            )
+            speeds = (self._reported[i + 1] - self._reported[i]) / max(duration_s, 1e-4)
+            fastest = max(fastest, float(np.abs(speeds - along_rad_s).max()))
         return fastest
 
     def _at(self, angles: Sequence[Array], stamp_s: float) -> Array:

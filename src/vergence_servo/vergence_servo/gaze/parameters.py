@@ -42,7 +42,10 @@ class GazeParameters(Parameters):
         0.85, "share of the known play that is crossed at once when a joint turns round", minimum=0, maximum=1
     )
     follow_acceleration_rad_s2: float = parameter(
-        1.0, "how fast a moving target changes its speed", unit="rad/s^2", minimum=0.01, maximum=100
+        1.0, "how fast a calmly moving target changes its speed", unit="rad/s^2", minimum=0.01, maximum=100
+    )
+    manoeuvre_acceleration_rad_s2: float = parameter(
+        8.0, "how fast it does while it manoeuvres", unit="rad/s^2", minimum=0.01, maximum=1000
     )
     still_drift_rad_sqrt_s: float = parameter(
         0.002, "random walk of a target at rest", unit="rad/sqrt(s)", minimum=0, maximum=1

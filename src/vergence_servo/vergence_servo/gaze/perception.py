@@ -35,6 +35,7 @@ _STEADY_VERGENCE_RAD = 0.005
 _SWEEPING_RAD_S = 0.6
 _STILL_SPEED_RAD_S = 0.2
 _ARRIVED_RAD = 0.004
+_COMMANDED_AHEAD_S = 0.03
 
 
 class Perception:
@@ -123,9 +124,10 @@ class Perception:
         return max(0.0, (self.image_s if images_come else now_s) - seen_s)
 
     def eyes_still(self, now_s: float, command_rad: Array) -> bool:
-        """Tell whether the joints rest where they were commanded (3,)."""
-        slow = self.history.speed_within(self.history.newest_s - 0.015, now_s) < _STILL_SPEED_RAD_S
-        return slow and self.off_rad(command_rad) < _ARRIVED_RAD
+        """Tell whether the joints rest where they were commanded (3,), or go along with the target."""
+        along = self.tracking.joint_rates_rad_s(now_s)
+        slow = self.history.speed_within(self.history.newest_s - 0.015, now_s, along) < _STILL_SPEED_RAD_S
+        return slow and self.off_rad(command_rad) < _ARRIVED_RAD + _COMMANDED_AHEAD_S * float(np.abs(along).max())
 
     def at(self, joints_rad: Array) -> bool:
         """Tell whether the joints are reported at these angles (3,); NaN asks nothing of its joint."""

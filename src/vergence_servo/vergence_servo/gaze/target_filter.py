@@ -1,11 +1,7 @@
-"""Where the target is: a Kalman filter on the version, vergence and tilt that fixate it.
+"""Where the target is: at rest or in motion, whichever has explained the recent measurements better.
 
-State (6,): version, its rate, vergence, its rate, tilt, its rate [rad, rad/s], all in the frame of the joints as they
-are estimated, so that what the filter says is what has to be commanded. Directions measured in one eye are linear in
-it, at any distance: the left eye's pan to the target is version - vergence / 2, the right eye's version + vergence / 2.
-
-Two models run side by side, a target at rest and one that moves; the one that has explained the recent measurements
-better is believed. A target that jumps first looks like an outlier: outliers that agree with one another are the jump.
+A target at rest is believed to be at rest, so that noise does not move the eyes; one in motion is predicted along its
+speed (`motion.py`). A jump looks like an outlier until a second one agrees with it.
 """
 
 import math
@@ -14,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from vergence_servo.gaze.kalman import TILT, VERGENCE, VERSION, Fit, Kalman, Measurement
+from vergence_servo.gaze.motion import Motion
+
 Array = npt.NDArray[np.float64]
 
-VERSION, VERGENCE, TILT = 0, 2, 4
 _EVIDENCE_FADE = 0.8
 _EVIDENCE_TO_MOVE = 7.0
 _EVIDENCE_TO_REST = -2.0
@@ -30,24 +28,8 @@ _RATE_SIGMA_RAD_S = 0.5
 _LONGEST_PREDICTION_S = 2.0
 _LARGEST_VARIANCE = 1.0
 _LATEST_S = 0.3
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """Linear measurements of one pair: row i says coefficients[i] @ state(t) = values[i] +- sigmas[i].
-
-    `coefficients` (n, 3) are for version, vergence, tilt; `stamps_s` (n,) the exposure that each belongs to.
-    """
-
-    coefficients: Array
-    values: Array
-    sigmas: Array
-    stamps_s: Array
-
-    @property
-    def stamp_s(self) -> float:
-        """The pair's stamp: the first row's."""
-        return float(self.stamps_s[0])
+_BELIEVED = 0.3
+_FOLLOWING_VARIANCE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -77,8 +59,12 @@ class TargetEstimate:
     @property
     def joints_rad(self) -> Array:
         """Joint angles (3,), pan_left, pan_right, tilt, that fixate the target."""
-        version, vergence, tilt = self.angles_rad
-        return np.array([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
+        return _joints(self.angles_rad)
+
+    @property
+    def joint_rates_rad_s(self) -> Array:
+        """How fast each joint (3,) turns while it follows the target."""
+        return _joints(self.rates_rad_s)
 
     @property
     def sigmas_rad(self) -> Array:
@@ -86,53 +72,19 @@ class TargetEstimate:
         return np.sqrt(np.diag(self.covariance))
 
 
-class _Kalman:
-    """One model. `acceleration` > 0: constant velocity with that random acceleration; 0: at rest with random walk."""
-
-    def __init__(self, acceleration_rad_s2: float, drift_rad_sqrt_s: float) -> None:
-        self._acceleration = acceleration_rad_s2
-        self._drift = drift_rad_sqrt_s
-        self.state = np.zeros(6)
-        self.covariance = np.zeros((6, 6))
-
-    @property
-    def moves(self) -> bool:
-        return self._acceleration > 0
-
-    def advance(self, duration_s: float) -> None:
-        transition = np.eye(6)
-        noise = np.zeros((6, 6))
-        for i in (VERSION, VERGENCE, TILT):
-            noise[i, i] = self._drift**2 * duration_s
-            if self.moves:
-                transition[i, i + 1] = duration_s
-                gain = np.array([0.5 * duration_s**2, duration_s]) * self._acceleration
-                noise[i : i + 2, i : i + 2] += np.outer(gain, gain)
-        self.state = transition @ self.state
-        self.covariance = transition @ self.covariance @ transition.T + noise
-
-    def innovation(self, measurement: Measurement, now_s: float) -> tuple[Array, Array, Array]:
-        """Return the design (n, 6), innovation (n,) and its covariance (n, n)."""
-        design = np.zeros((len(measurement.values), 6))
-        design[:, 0::2] = measurement.coefficients
-        if self.moves:
-            design[:, 1::2] = measurement.coefficients * (measurement.stamps_s - now_s)[:, None]
-        spread = design @ self.covariance @ design.T + np.diag(measurement.sigmas**2)
-        return design, measurement.values - design @ self.state, spread
-
-    def correct(self, design: Array, innovation: Array, spread: Array, sigmas: Array) -> None:
-        gain = np.linalg.solve(spread, design @ self.covariance).T
-        self.state = self.state + gain @ innovation
-        # Joseph's form: the short one loses its positive variances where a certain measurement meets a vague prior.
-        kept = np.eye(6) - gain @ design
-        self.covariance = kept @ self.covariance @ kept.T + (gain * sigmas**2) @ gain.T
-
-
 class TargetFilter:
-    """The two models, their evidence, and the gate."""
+    """The models, the evidence for each, and the gate."""
 
-    def __init__(self, acceleration_rad_s2: float, drift_rad_sqrt_s: float, gate_sigma: float, jump_count: int) -> None:
-        self._models = (_Kalman(0.0, drift_rad_sqrt_s), _Kalman(acceleration_rad_s2, 0.0))
+    def __init__(
+        self,
+        acceleration_rad_s2: float,
+        manoeuvre_rad_s2: float,
+        drift_rad_sqrt_s: float,
+        gate_sigma: float,
+        jump_count: int,
+    ) -> None:
+        self._rest = Kalman(0.0, drift_rad_sqrt_s)
+        self._motion = Motion(acceleration_rad_s2, manoeuvre_rad_s2)
         self._gate = gate_sigma**2
         self._jump_count = jump_count
         self._evidence = 0.0
@@ -159,13 +111,11 @@ class TargetFilter:
 
     def start(self, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
         """Begin anew with a target at these angles (3,) with this covariance (3, 3), of unknown speed."""
-        for model in self._models:
-            model.state = np.zeros(6)
-            model.state[0::2] = angles_rad
-            model.covariance = np.zeros((6, 6))
-            model.covariance[0::2, 0::2] = covariance
-            if model.moves:
-                model.covariance[1::2, 1::2] = np.eye(3) * _RATE_SIGMA_RAD_S**2
+        state, whole = np.zeros(6), np.zeros((6, 6))
+        state[0::2], whole[0::2, 0::2] = angles_rad, covariance
+        self._rest.state, self._rest.covariance = state, whole.copy()
+        whole[1::2, 1::2] = np.eye(3) * _RATE_SIGMA_RAD_S**2
+        self._motion.start(state, whole)
         self._evidence, self._moving = 0.0, False
         self._outliers.clear()
         self._time_s = stamp_s
@@ -184,7 +134,7 @@ class TargetFilter:
         extra[VERGENCE, VERGENCE] = left + right
         extra[VERSION, VERGENCE] = extra[VERGENCE, VERSION] = 0.5 * (right - left)
         extra[TILT, TILT] = tilt
-        for model in self._models:
+        for model in (self._rest, *self._motion.modes):
             model.covariance = model.covariance + extra
 
     def update(self, measurement: Measurement, may_jump: bool = True) -> bool:
@@ -196,88 +146,105 @@ class TargetFilter:
         if not self.initialised or measurement.stamp_s < self._time_s - _LATEST_S:
             return False
         self._advance(measurement.stamp_s)
-        terms = [model.innovation(measurement, self._time_s) for model in self._models]
-        fits = [float(innovation @ np.linalg.solve(spread, innovation)) for _, innovation, spread in terms]
+        rest, motion = self._rest.fit(measurement, self._time_s), self._motion.fits(measurement, self._time_s)
+        self.last_innovation_rad = float(np.abs(motion[0].innovation).max())
         bound = self._gate + 2.0 * (len(measurement.values) - 1)
-        self.last_innovation_rad = float(np.abs(terms[1][1]).max())
-        if min(fits) > bound:
-            if not (may_jump and self._is_jump(measurement)):
+        if not self._fits(measurement, rest, motion, bound):
+            agreeing = self._agreeing_outlier(measurement)
+            if agreeing is None or not may_jump:
                 return False
-            self._jump(measurement)
-            terms = [model.innovation(measurement, self._time_s) for model in self._models]
+            self._jump(agreeing, measurement)
+            rest, motion = self._rest.fit(measurement, self._time_s), self._motion.fits(measurement, self._time_s)
         else:
             # A depth that fits says nothing against a direction that does not.
-            self._outliers = [before for before in self._outliers if not _alike(before, measurement)]
-            losses = [0.5 * (fit + math.log(np.linalg.det(term[2]))) for fit, term in zip(fits, terms, strict=True)]
-            if self._weigh(losses[0] - losses[1]):
-                terms = [model.innovation(measurement, self._time_s) for model in self._models]
-        for model, fit, (design, innovation, spread) in zip(self._models, fits, terms, strict=True):
-            if not model.moves and fit > bound and self._moving:
-                # The target moves: a model at rest that no longer fits follows, so that it can take over when it stops.
-                model.state[0::2] = self._models[1].state[0::2]
-                model.covariance[0::2, 0::2] += np.eye(3) * 1e-5
-                continue
-            model.correct(design, innovation, spread, measurement.sigmas)
+            self._outliers = [before for before in self._outliers if not before.alike(measurement)]
+            self._weigh(rest.loss - self._motion.loss(motion))
+        self._motion.correct(motion, measurement.sigmas)
+        if rest.distance > bound and self._moving:
+            # A model at rest that no longer fits follows, so that it can take over when the target stops.
+            self._rest_where_it_moves()
+        else:
+            # At rest it has moved somewhat: what was known of its place counts the less, the farther that was off.
+            self._rest.covariance = self._rest.covariance * max(1.0, rest.distance / bound)
+            rest = self._rest.fit(measurement, self._time_s)
+            self._rest.correct(rest, measurement.sigmas)
         self.last_accepted_s = measurement.stamp_s
         return True
 
     def at(self, time_s: float) -> TargetEstimate:
         """Return the target at `time_s`. Speed is believed for a while and then fades, uncertainty grows on."""
-        model = self._models[1] if self._moving else self._models[0]
+        state, spread = self._motion.mixed() if self._moving else (self._rest.state, self._rest.covariance)
         ahead_s = min(max(time_s - self._time_s, -_LONGEST_PREDICTION_S), _LONGEST_PREDICTION_S)
         straight_s = min(ahead_s, _COAST_STRAIGHT_S)
-        fading_s = _COAST_FADE_S * (1.0 - math.exp(-(ahead_s - straight_s) / _COAST_FADE_S))
-        angles = model.state[0::2] + model.state[1::2] * (straight_s + fading_s)
-        covariance = model.covariance[0::2, 0::2]
-        if model.moves and ahead_s > 0:
-            cross = model.covariance[0::2, 1::2]
-            covariance = covariance + ahead_s * (cross + cross.T) + ahead_s**2 * model.covariance[1::2, 1::2]
         fade = math.exp(-(ahead_s - straight_s) / _COAST_FADE_S)
-        return TargetEstimate(angles, model.state[1::2] * fade, covariance, self._moving)
+        angles = state[0::2] + state[1::2] * (straight_s + _COAST_FADE_S * (1.0 - fade))
+        covariance = spread[0::2, 0::2]
+        if self._moving and ahead_s > 0:
+            cross = spread[0::2, 1::2]
+            covariance = covariance + ahead_s * (cross + cross.T) + ahead_s**2 * spread[1::2, 1::2]
+        return TargetEstimate(angles, state[1::2] * fade, covariance, self._moving)
 
     def _advance(self, stamp_s: float) -> None:
         duration_s = min(stamp_s - self._time_s, _LONGEST_PREDICTION_S)
         if duration_s > 0:
-            for model in self._models:
-                model.advance(duration_s)
+            self._rest.advance(duration_s)
+            self._motion.advance(duration_s)
+            for model in (self._rest, *self._motion.modes):
                 model.covariance *= min(1.0, _LARGEST_VARIANCE / max(float(model.covariance.diagonal().max()), 1e-12))
             self._time_s = stamp_s
 
-    def _weigh(self, advantage: float) -> bool:
-        """Add to the evidence for motion; True if the model at rest has taken over the moving one's estimate."""
+    def _fits(self, measurement: Measurement, rest: Fit, motion: tuple[Fit, Fit], bound: float) -> bool:
+        """Tell whether a measurement may be of the target, by a model that is believed.
+
+        A manoeuvre may begin at any time, but sideways: its wide gate is no reason to take what lies at another depth.
+        """
+        if not self._moving and rest.distance <= bound:
+            return True
+        believed = self._motion.weights > _BELIEVED
+        if any(fit.distance <= bound for fit, yes in zip(motion, believed, strict=True) if yes):
+            return True
+        row = measurement.depth_row
+        return row is not None and motion[1].distance <= bound and motion[0].depth_distance(row) <= self._gate
+
+    def _weigh(self, advantage: float) -> None:
+        """Add to the evidence for motion; at its end the model at rest takes over where the target is."""
         evidence = _EVIDENCE_FADE * self._evidence + max(min(advantage, 5.0), -3.0)
         self._evidence = min(max(evidence, _EVIDENCE_BOUNDS[0]), _EVIDENCE_BOUNDS[1])
-        rates, spread = self._models[1].state[1::2], self._models[1].covariance[1::2, 1::2]
+        if self._moving:
+            if self._evidence < _EVIDENCE_TO_REST:
+                self._moving = False
+                self._rest_where_it_moves()
+            return
+        state, covariance = self._motion.mixed()
+        rates, spread = state[1::2], covariance[1::2, 1::2]
         significant = float(rates @ np.linalg.solve(spread, rates)) > _SIGNIFICANT_RATE
-        if self._moving and self._evidence < _EVIDENCE_TO_REST:
-            self._moving = False
-            self._models[0].state[0::2] = self._models[1].state[0::2]
-            self._models[0].covariance[0::2, 0::2] = self._models[1].covariance[0::2, 0::2]
-            return True
-        enough = _EVIDENCE_TO_MOVE if significant else _EVIDENCE_SURE
-        if not self._moving and self._evidence > enough:
-            self._moving = True
-        return False
+        self._moving = self._evidence > (_EVIDENCE_TO_MOVE if significant else _EVIDENCE_SURE)
 
-    def _is_jump(self, measurement: Measurement) -> bool:
-        """Count `measurement` among the outliers; True once enough of them agree."""
+    def _rest_where_it_moves(self) -> None:
+        state, covariance = self._motion.mixed()
+        self._rest.state[0::2] = state[0::2]
+        self._rest.covariance[0::2, 0::2] = covariance[0::2, 0::2] + np.eye(3) * _FOLLOWING_VARIANCE
+
+    def _agreeing_outlier(self, measurement: Measurement) -> Measurement | None:
+        """Count `measurement` among the outliers; once enough of them agree return the first of those."""
         comparable = [
             before
             for before in self._outliers
-            if _alike(before, measurement) and measurement.stamp_s - before.stamp_s < 0.5
+            if before.alike(measurement) and measurement.stamp_s - before.stamp_s < 0.5
         ]
         self._outliers = [*comparable[-self._jump_count :], measurement]
         if len(self._outliers) < self._jump_count:
-            return False
-        for before in self._outliers[-self._jump_count : -1]:
+            return None
+        agreeing = self._outliers[-self._jump_count : -1]
+        for before in agreeing:
             allowed = 5.0 * np.hypot(before.sigmas, measurement.sigmas)
             allowed = allowed + 2.0 * _RATE_SIGMA_RAD_S * max(measurement.stamp_s - before.stamp_s, 0.0)
             if (np.abs(before.values - measurement.values) > allowed).any():
-                return False
-        return True
+                return None
+        return agreeing[0] if agreeing else measurement
 
-    def _jump(self, measurement: Measurement) -> None:
-        """Open the estimate for a target that is elsewhere, in the directions that the measurement tells of."""
+    def _jump(self, before: Measurement, measurement: Measurement) -> None:
+        """Open the estimate for a target that is elsewhere, in the directions that the measurements tell of."""
         seen = np.abs(measurement.coefficients).max(axis=0) > 0
         if not seen[0]:
             # Only the depth: the left eye, which saw it, stays where it is.
@@ -287,16 +254,29 @@ class TargetFilter:
             ways = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         else:
             ways = np.eye(3)
-        spread = ways.T @ ways
-        for model in self._models:
-            model.covariance[0::2, 0::2] += spread * _JUMP_SIGMA_RAD**2
-            model.state[1::2] = 0.0
-            if model.moves:
-                model.covariance[1::2, 1::2] += np.eye(3) * _RATE_SIGMA_RAD_S**2
+        state, covariance = self._motion.mixed()
+        covariance[0::2, 0::2] += ways.T @ ways * _JUMP_SIGMA_RAD**2
+        covariance[0::2, 1::2] = covariance[1::2, 0::2] = 0.0
+        state[1::2], variances = _speed(before, measurement) if len(ways) == 3 else (0.0, _RATE_SIGMA_RAD_S**2)
+        covariance[1::2, 1::2] = np.eye(3) * variances
+        self._motion.start(state, covariance, (0.5, 0.5))
+        self._rest.covariance = self._rest.covariance.copy()
+        self._rest.covariance[0::2, 0::2] += ways.T @ ways * _JUMP_SIGMA_RAD**2
         self._evidence, self._moving = 0.0, False
         self._outliers.clear()
 
 
-def _alike(one: Measurement, other: Measurement) -> bool:
-    """Tell whether two measurements are of the same kind."""
-    return np.array_equal(one.coefficients, other.coefficients)
+def _speed(before: Measurement, after: Measurement) -> tuple[Array, float]:
+    """Return the rates (3,) between two places of a target that was thought to be elsewhere, and their variance."""
+    prior = _RATE_SIGMA_RAD_S**2
+    duration_s = after.stamp_s - before.stamp_s
+    if not duration_s > 0.01:
+        return np.zeros(3), prior
+    rates = np.linalg.solve(after.coefficients, after.values - before.values) / duration_s
+    noise = 2.0 * float(np.max(after.sigmas)) ** 2 / duration_s**2
+    return rates * prior / (prior + noise), prior * noise / (prior + noise)
+
+
+def _joints(angles: Array) -> Array:
+    version, vergence, tilt = angles
+    return np.array([version - 0.5 * vergence, version + 0.5 * vergence, tilt])

@@ -22,11 +22,14 @@ from vergence_servo.gaze.laws.protocol import VisualError
 from vergence_servo.gaze.locks import BoxLock, TrackLock
 from vergence_servo.gaze.observations import BoxSighting, FoveaDisparity, PointSighting, TrackSighting
 from vergence_servo.gaze.parameters import GazeParameters
-from vergence_servo.gaze.target_filter import Measurement, TargetEstimate, TargetFilter
+from vergence_servo.gaze.kalman import Measurement
+from vergence_servo.gaze.target_filter import TargetEstimate, TargetFilter
 
 Array = npt.NDArray[np.float64]
 
-_TIMING_SIGMA_S = 0.003
+_TIMING_SIGMA_S = 0.006
+_CATCHING_UP_RAD_S = 2.0
+"""How fast the eyes may slip off a moving target: who must catch up cannot wait for a still image."""
 _FRESH_S = 0.15
 _BOX_LATE_S = 0.4
 _SEEN_THERE_S = 0.3
@@ -45,6 +48,7 @@ class TargetTracking:
         self._baseline_m = rig.baseline_m
         self.filter = TargetFilter(
             parameters.follow_acceleration_rad_s2,
+            parameters.manoeuvre_acceleration_rad_s2,
             parameters.still_drift_rad_sqrt_s,
             parameters.gate_sigma,
             parameters.jump_count,
@@ -100,6 +104,11 @@ class TargetTracking:
     def estimate(self, time_s: float) -> TargetEstimate | None:
         """Return the target at `time_s`, or None if there is none."""
         return self.filter.at(time_s) if self.filter.initialised else None
+
+    def joint_rates_rad_s(self, time_s: float) -> Array:
+        """Return how fast each joint (3,) turns while it follows the target; 0 while none moves."""
+        estimate = self.estimate(time_s)
+        return estimate.joint_rates_rad_s if estimate is not None and estimate.moving else np.zeros(3)
 
     def see_track(self, sighting: TrackSighting, now_s: float) -> bool:
         """Take a track; True if it was the target's and was believed."""
@@ -268,13 +277,21 @@ class TargetTracking:
         self.filter.start(measurement.stamp_s, angles, np.diag(np.square([wide, sigma, wide])))
 
     def eyes_were_still(self, stamp_s: float, skew_s: float) -> bool:
-        """Tell whether the eyes turned slowly enough, and for long enough before, for a pair to be used."""
+        """Tell whether the eyes turned slowly enough, and for long enough before, for a pair to be used.
+
+        Eyes that go along with a target have it as still before them as eyes at rest one that rests.
+        """
         if not (math.isfinite(stamp_s) and math.isfinite(skew_s) and abs(skew_s) < 0.1):
             return False
         if not self._history.covers(stamp_s):
             return False
         first, last = min(stamp_s, stamp_s + skew_s), max(stamp_s, stamp_s + skew_s)
-        return self._history.speed_within(first - self._p.settle_s, last) < self._p.still_speed_rad_s
+        begin = first - self._p.settle_s
+        if self._history.speed_within(begin, last) < self._p.still_speed_rad_s:
+            return True
+        if not self.filter.moving:
+            return False
+        return self._history.speed_within(begin, last, self.joint_rates_rad_s(stamp_s)) < _CATCHING_UP_RAD_S
 
     def _sigma(self, stamp_s: float, sigma_rad: float) -> float:
         """Add what a few milliseconds of doubt about the stamps mean while the eyes move."""
