@@ -65,3 +65,23 @@ def test_joints_come_at_their_own_rate():
     while schedule.next_due_s() < 0.995:
         count += schedule.pop(schedule.next_due_s()).kind == "joints"
     assert count == 100
+
+
+def test_a_late_machine_still_tells_the_joints_of_every_beat():
+    schedule = Schedule(SimParameters(joint_rate_hz=100.0), 0.0)
+    stamps = []
+    while schedule.next_due_s() < 0.995:
+        event = schedule.pop(schedule.next_due_s() + 0.2)
+        if event.kind == "joints":
+            stamps.append(event.due_s)
+    assert stamps == pytest.approx([0.01 * beat for beat in range(100)])
+
+
+def test_a_machine_that_slept_does_not_tell_the_joints_of_all_that_time():
+    schedule = Schedule(SimParameters(joint_rate_hz=100.0), 0.0)
+    late_s, stamps = 60.0, []
+    for _ in range(300):
+        event = schedule.pop(max(schedule.next_due_s(), late_s))
+        if event.kind == "joints":
+            stamps.append(event.due_s)
+    assert len([stamp for stamp in stamps if stamp < late_s]) <= 102

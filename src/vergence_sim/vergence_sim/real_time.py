@@ -20,8 +20,15 @@ class Event:
     payload: object = field(compare=False, default=None)
 
 
+_JOINTS_GIVEN_UP_S = 1.0
+
+
 class Schedule:
-    """The next thing to do, in order of time. An exposure that is a whole period late is dropped and counted."""
+    """The next thing to do, in order of time. An exposure that is a whole period late is dropped and counted.
+
+    Joint states are told for every beat, however late: they cost nothing, and between sparse ones nobody could tell
+    where the eyes were when a picture was exposed.
+    """
 
     def __init__(self, parameters: SimParameters, start_s: float) -> None:
         self._rng = np.random.default_rng(np.random.SeedSequence(parameters.seed).spawn(3)[2])
@@ -50,7 +57,7 @@ class Schedule:
                 self._beats_s[event.eye] += self._periods_s[event.eye]
             self._expose(event.eye)
         elif event.kind == "joints":
-            self._push(max(event.due_s + self._joint_period_s, now_s), "joints")
+            self._push(max(event.due_s + self._joint_period_s, now_s - _JOINTS_GIVEN_UP_S), "joints")
         return event
 
     def publish(self, eye: str, due_s: float, payload: object) -> None:
