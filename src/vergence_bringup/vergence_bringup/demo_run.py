@@ -67,7 +67,6 @@ class StationRunner:
         recorder = self._recorder
         for what in self._places:
             self._show(what, _OUT_OF_SIGHT_M)  # until the eyes are at the start
-        recorder.set_parameters("box_metric_node", {"enable": station.has_boxes}, self._alive)
         recorder.set_parameters("gaze_controller_node", {"mode": "both_eyes"}, self._alive)
         self._look_at_angles(station)
         recorder.settle(_SETTLE_S, self._alive)

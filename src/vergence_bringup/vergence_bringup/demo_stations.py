@@ -55,8 +55,8 @@ class Station:
 
     @property
     def has_boxes(self) -> bool:
-        """True if metric II is measured: the shipped detector knows the cube alone, and pursuit needs the cores."""
-        return self.target == "cube" and not self.moving
+        """True if metric II sees the target: the shipped detector knows the cube alone."""
+        return self.target == "cube"
 
 
 def cube_held(baseline_m: float) -> Station:
