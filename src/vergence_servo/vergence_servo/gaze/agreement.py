@@ -9,7 +9,8 @@ from collections import deque
 
 _SAME_PAIR_S = 0.012
 _FRESH_S = 0.5
-_ENOUGH_PAIRS = 5
+_ENOUGH_PAIRS = 10
+_SILENT_S = 0.3
 _MEMORY = 0.7
 _SMOOTHED = math.sqrt((1.0 - _MEMORY) / (1.0 + _MEMORY))
 _SURE = 3.0
@@ -35,12 +36,17 @@ class Agreement:
     @property
     def disagreement(self) -> bool:
         """True while two estimators differ by more than the object's own depth explains, and no box decides."""
-        return self._differing >= _ENOUGH_PAIRS
+        return self._differing >= _ENOUGH_PAIRS and self._both_speak
 
     @property
     def doubtful(self) -> bool:
         """True if estimators have just differed, though not for long enough to call it a disagreement."""
-        return self._differing > 0
+        return self._differing > 0 and self._both_speak
+
+    @property
+    def _both_speak(self) -> bool:
+        """False once the fovea tells nothing any more while the tracker goes on."""
+        return bool(self._track and self._fovea) and self._track[-1][0] - self._fovea[-1][0] < _SILENT_S
 
     def track_is_fresh(self, stamp_s: float, within_s: float) -> bool:
         """Tell whether the tracker has told a vergence lately."""

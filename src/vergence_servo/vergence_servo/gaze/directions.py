@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from vergence_rig.geometry import UnreachableError, angles_of_direction, gaze_for_point, rotation_rig_from_eye
 from vergence_servo.gaze.joint_history import JointHistory
-from vergence_servo.gaze.observations import BoxSighting, TrackSighting
 from vergence_servo.gaze.kalman import Measurement
+from vergence_servo.gaze.observations import BoxSighting, TrackSighting
 
 Array = npt.NDArray[np.float64]
 

@@ -32,13 +32,16 @@ class TrackLock:
     def adopt(
         self,
         track_id: int,
-        offset: tuple[float, float],
-        vergence_off_rad: float,
+        seen_rad: Array,
         estimate: TargetEstimate,
         radius_rad: float,
         depth_margin_rad: float,
     ) -> str:
-        """Take a track `offset` (pan, tilt) [rad] beside the target for its own; return why not, or nothing."""
+        """Take a track at `seen_rad` (left pan, right pan, tilt) for the target's; return why not, or nothing."""
+        joints = estimate.joints_rad
+        offset = (float(joints[0] - seen_rad[0]), float(joints[2] - seen_rad[2]))
+        deeper = float(seen_rad[1] - seen_rad[0]) - estimate.vergence_rad
+        vergence_off_rad = deeper if math.isfinite(deeper) else 0.0
         distance = math.hypot(*offset)
         if track_id == self._refused_id:
             return "the tracker follows something that the boxes say is not the target"

@@ -28,6 +28,7 @@ _RATE_SIGMA_RAD_S = 0.5
 _LONGEST_PREDICTION_S = 2.0
 _LARGEST_VARIANCE = 1.0
 _LATEST_S = 0.3
+_COMPARABLE_S = 0.5
 _BELIEVED = 0.3
 _FOLLOWING_VARIANCE = 1e-5
 
@@ -137,7 +138,7 @@ class TargetFilter:
         for model in (self._rest, *self._motion.modes):
             model.covariance = model.covariance + extra
 
-    def update(self, measurement: Measurement, may_jump: bool = True) -> bool:
+    def update(self, measurement: Measurement) -> bool:
         """Take a measurement; False if it was too late or gated out (for now: it may turn out to be a jump).
 
         A detector is slower than a tracker, so that stamps arrive out of order: the state is taken back to the stamp
@@ -148,27 +149,29 @@ class TargetFilter:
         self._advance(measurement.stamp_s)
         rest, motion = self._rest.fit(measurement, self._time_s), self._motion.fits(measurement, self._time_s)
         self.last_innovation_rad = float(np.abs(motion[0].innovation).max())
-        bound = self._gate + 2.0 * (len(measurement.values) - 1)
-        if not self._fits(measurement, rest, motion, bound):
-            agreeing = self._agreeing_outlier(measurement)
-            if agreeing is None or not may_jump:
-                return False
-            self._jump(agreeing, measurement)
-            rest, motion = self._rest.fit(measurement, self._time_s), self._motion.fits(measurement, self._time_s)
-        else:
-            # A depth that fits says nothing against a direction that does not.
-            self._outliers = [before for before in self._outliers if not before.alike(measurement)]
-            self._weigh(rest.loss - self._motion.loss(motion))
-        self._motion.correct(motion, measurement.sigmas)
-        if rest.distance > bound and self._moving:
-            # A model at rest that no longer fits follows, so that it can take over when the target stops.
-            self._rest_where_it_moves()
-        else:
-            # At rest it has moved somewhat: what was known of its place counts the less, the farther that was off.
-            self._rest.covariance = self._rest.covariance * max(1.0, rest.distance / bound)
-            rest = self._rest.fit(measurement, self._time_s)
-            self._rest.correct(rest, measurement.sigmas)
-        self.last_accepted_s = measurement.stamp_s
+        if not self._fits(measurement, rest, motion):
+            comparable = [
+                before
+                for before in self._outliers
+                if before.alike(measurement) and measurement.stamp_s - before.stamp_s < _COMPARABLE_S
+            ]
+            self._outliers = [*comparable[-self._jump_count :], measurement]
+            return False
+        # A depth that fits says nothing against a direction that does not.
+        self._outliers = [before for before in self._outliers if not before.alike(measurement)]
+        self._weigh(rest.loss - self._motion.loss(motion))
+        self._take(measurement, motion)
+        return True
+
+    def jump(self, measurement: Measurement) -> bool:
+        """Take a measurement that `update` has just refused, if enough before it agree: the target is elsewhere."""
+        agreeing = self._outliers[-self._jump_count :]
+        if len(agreeing) < self._jump_count or agreeing[-1] is not measurement:
+            return False
+        if not all(_agree(before, measurement) for before in agreeing[:-1]):
+            return False
+        self._open(agreeing[0], measurement)
+        self._take(measurement, self._motion.fits(measurement, self._time_s))
         return True
 
     def at(self, time_s: float) -> TargetEstimate:
@@ -193,11 +196,12 @@ class TargetFilter:
                 model.covariance *= min(1.0, _LARGEST_VARIANCE / max(float(model.covariance.diagonal().max()), 1e-12))
             self._time_s = stamp_s
 
-    def _fits(self, measurement: Measurement, rest: Fit, motion: tuple[Fit, Fit], bound: float) -> bool:
+    def _fits(self, measurement: Measurement, rest: Fit, motion: tuple[Fit, Fit]) -> bool:
         """Tell whether a measurement may be of the target, by a model that is believed.
 
         A manoeuvre may begin at any time, but sideways: its wide gate is no reason to take what lies at another depth.
         """
+        bound = self._bound(measurement)
         if not self._moving and rest.distance <= bound:
             return True
         believed = self._motion.weights > _BELIEVED
@@ -225,25 +229,25 @@ class TargetFilter:
         self._rest.state[0::2] = state[0::2]
         self._rest.covariance[0::2, 0::2] = covariance[0::2, 0::2] + np.eye(3) * _FOLLOWING_VARIANCE
 
-    def _agreeing_outlier(self, measurement: Measurement) -> Measurement | None:
-        """Count `measurement` among the outliers; once enough of them agree return the first of those."""
-        comparable = [
-            before
-            for before in self._outliers
-            if before.alike(measurement) and measurement.stamp_s - before.stamp_s < 0.5
-        ]
-        self._outliers = [*comparable[-self._jump_count :], measurement]
-        if len(self._outliers) < self._jump_count:
-            return None
-        agreeing = self._outliers[-self._jump_count : -1]
-        for before in agreeing:
-            allowed = 5.0 * np.hypot(before.sigmas, measurement.sigmas)
-            allowed = allowed + 2.0 * _RATE_SIGMA_RAD_S * max(measurement.stamp_s - before.stamp_s, 0.0)
-            if (np.abs(before.values - measurement.values) > allowed).any():
-                return None
-        return agreeing[0] if agreeing else measurement
+    def _take(self, measurement: Measurement, motion: tuple[Fit, Fit]) -> None:
+        self._motion.correct(motion, measurement.sigmas)
+        rest = self._rest.fit(measurement, self._time_s)
+        off = rest.distance / self._bound(measurement)
+        if off > 1.0 and self._moving:
+            # A model at rest that no longer fits follows, so that it can take over when the target stops.
+            self._rest_where_it_moves()
+        else:
+            if off > 1.0:
+                # It has moved somewhat: what was known of its place counts the less, the farther off that was.
+                self._rest.covariance = self._rest.covariance * off
+                rest = self._rest.fit(measurement, self._time_s)
+            self._rest.correct(rest, measurement.sigmas)
+        self.last_accepted_s = measurement.stamp_s
 
-    def _jump(self, before: Measurement, measurement: Measurement) -> None:
+    def _bound(self, measurement: Measurement) -> float:
+        return self._gate + 2.0 * (len(measurement.values) - 1)
+
+    def _open(self, before: Measurement, measurement: Measurement) -> None:
         """Open the estimate for a target that is elsewhere, in the directions that the measurements tell of."""
         seen = np.abs(measurement.coefficients).max(axis=0) > 0
         if not seen[0]:
@@ -266,15 +270,23 @@ class TargetFilter:
         self._outliers.clear()
 
 
+def _agree(before: Measurement, after: Measurement) -> bool:
+    """Tell whether two measurements may be of one thing."""
+    allowed = 5.0 * np.hypot(before.sigmas, after.sigmas)
+    allowed = allowed + 2.0 * _RATE_SIGMA_RAD_S * max(after.stamp_s - before.stamp_s, 0.0)
+    return bool((np.abs(before.values - after.values) <= allowed).all())
+
+
 def _speed(before: Measurement, after: Measurement) -> tuple[Array, float]:
     """Return the rates (3,) between two places of a target that was thought to be elsewhere, and their variance."""
     prior = _RATE_SIGMA_RAD_S**2
     duration_s = after.stamp_s - before.stamp_s
     if not duration_s > 0.01:
         return np.zeros(3), prior
-    rates = np.linalg.solve(after.coefficients, after.values - before.values) / duration_s
+    rates: Array = np.linalg.solve(after.coefficients, after.values - before.values) / duration_s
     noise = 2.0 * float(np.max(after.sigmas)) ** 2 / duration_s**2
-    return rates * prior / (prior + noise), prior * noise / (prior + noise)
+    shrunk: Array = rates * (prior / (prior + noise))
+    return shrunk, prior * noise / (prior + noise)
 
 
 def _joints(angles: Array) -> Array:

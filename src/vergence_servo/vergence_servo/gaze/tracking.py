@@ -7,6 +7,7 @@ fovea differ, the boxes' depth is the target's.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,27 +16,23 @@ import numpy.typing as npt
 from vergence_rig.rig import Rig
 from vergence_servo.gaze import directions
 from vergence_servo.gaze.agreement import Agreement
+from vergence_servo.gaze.depth_watch import DepthWatch
 from vergence_servo.gaze.directions import SightingError
+from vergence_servo.gaze.exposures import Exposures
 from vergence_servo.gaze.joint_history import JointHistory
 from vergence_servo.gaze.joint_moves import JointMoves
+from vergence_servo.gaze.kalman import Measurement
 from vergence_servo.gaze.laws.protocol import VisualError
 from vergence_servo.gaze.locks import BoxLock, TrackLock
 from vergence_servo.gaze.observations import BoxSighting, FoveaDisparity, PointSighting, TrackSighting
 from vergence_servo.gaze.parameters import GazeParameters
-from vergence_servo.gaze.kalman import Measurement
+from vergence_servo.gaze.rivals import SAME_DEPTH_RAD, Rivals
 from vergence_servo.gaze.target_filter import TargetEstimate, TargetFilter
 
 Array = npt.NDArray[np.float64]
 
-_TIMING_SIGMA_S = 0.006
-_CATCHING_UP_RAD_S = 2.0
-"""How fast the eyes may slip off a moving target: who must catch up cannot wait for a still image."""
 _FRESH_S = 0.15
 _BOX_LATE_S = 0.4
-_SEEN_THERE_S = 0.3
-_JUMP_PATIENCE_S = 0.12
-_DEPTH_PATIENCE_S = 0.4
-_SAME_DEPTH_RAD = 0.006
 _SIGMA_BOUNDS_RAD = (1e-5, 0.5)
 
 
@@ -53,7 +50,10 @@ class TargetTracking:
             parameters.gate_sigma,
             parameters.jump_count,
         )
+        self._exposures = Exposures(parameters, history)
         self._agreement = Agreement(parameters.disagreement_rad)
+        self._depths = DepthWatch(parameters.disagreement_rad, parameters.verged_enter_rad)
+        self._rivals = Rivals(parameters.distractor_patience_s)
         self.clear()
 
     def clear(self) -> None:
@@ -67,9 +67,9 @@ class TargetTracking:
         self.note = ""
         self._track, self._boxes = TrackLock(), BoxLock()
         self._agreement.clear()
-        self._wanted_since_s = -math.inf
-        self._target_seen_s = self._fovea_agreed_s = -math.inf
-        self._boxes_off_since_s = self._depth_off_since_s = math.nan
+        self._depths.clear()
+        self._rivals.clear()
+        self._wanted_since_s = self._target_seen_s = -math.inf
         self._fovea_was_astray = False
 
     def want(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
@@ -114,7 +114,7 @@ class TargetTracking:
         """Take a track; True if it was the target's and was believed."""
         if not sighting.usable or not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
-        sigma = self._sigma(sighting.stamp_s, self._p.direction_sigma_rad)
+        sigma = self._exposures.sigma(sighting.stamp_s, self._p.direction_sigma_rad)
         disparity_sigma = _positive(sighting.sigma_rad, self._p.direction_sigma_rad)
         measurement, seen = directions.track(self._history, sighting, sigma, disparity_sigma)
         if not self._is_wanted_track(sighting, seen):
@@ -123,7 +123,8 @@ class TargetTracking:
             vergence = float(seen[1] - seen[0])
             own_depth = _own_depth(vergence, sighting.extent_rad)
             self._agreement.see_track(sighting.stamp_s, vergence, own_depth)
-            if self._is_sudden_depth(sighting.stamp_s, vergence, own_depth):
+            estimate = self.estimate(sighting.stamp_s)
+            if estimate is not None and self._depths.is_sudden(sighting.stamp_s, vergence, own_depth, estimate):
                 # Something else covers part of it: where it is can still be told.
                 there = replace(sighting, disparity_rad=math.nan)
                 measurement, seen = directions.track(self._history, there, sigma, disparity_sigma)
@@ -131,48 +132,41 @@ class TargetTracking:
         measurement, seen = directions.shifted(measurement, pan, tilt), seen + np.array([pan, pan, tilt])
         return self._believe(measurement, seen, sighting.skew_s, now_s, "track")
 
-    def _is_sudden_depth(self, stamp_s: float, vergence_rad: float, own_depth_rad: float) -> bool:
-        """Tell whether a track's depth is far from what is known, and was not for long: things do not jump in depth."""
-        estimate = self.estimate(stamp_s)
-        if estimate is None or not estimate.sigmas_rad[1] < self._p.verged_enter_rad:
-            return False
-        if abs(vergence_rad - estimate.vergence_rad) <= self._p.disagreement_rad + own_depth_rad:
-            self._depth_off_since_s = math.nan
-            return False
-        self._depth_off_since_s = _first(self._depth_off_since_s, stamp_s)
-        return stamp_s - self._depth_off_since_s < _DEPTH_PATIENCE_S
-
     def see_fovea(self, sighting: FoveaDisparity, now_s: float) -> bool:
         """Take the disparity at the left fovea; True if it was the target's and was believed."""
         if not (sighting.usable and sighting.confidence >= self._p.minimum_confidence):
             self.note = sighting.reason or "no confident disparity at the fovea"
             return False
         stamp_s = sighting.stamp_s
-        if not self.eyes_were_still(stamp_s, sighting.skew_s) or not self._at_fovea(stamp_s):
+        if not self.eyes_were_still(stamp_s, sighting.skew_s) or not self._exposures.at_fovea(
+            stamp_s, self.estimate(stamp_s)
+        ):
             return False
-        sigma = self._sigma(stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
+        sigma = self._exposures.sigma(stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
         measurement = directions.fovea_vergence(self._history, stamp_s, sighting.skew_s, sighting.horizontal_rad, sigma)
         vergence = float(measurement.values[0])
+        joints = self._history.shaft_at(stamp_s)
         self._agreement.see_fovea(stamp_s, vergence)
+        self._depths.see_fovea(stamp_s, vergence)
+        self._rivals.see_fovea(stamp_s, vergence, joints)
         if self._agreement.track_is_fresh(stamp_s, _FRESH_S):
             return False  # the tracker measures the target itself; the fovea only whatever lies there
         if not self._agreement.fovea_may_be_the_target(stamp_s, vergence):
             self.note = "the fovea looks past the target that the boxes show"
             return False
-        joints = self._history.shaft_at(stamp_s)
         seen = np.array([math.nan, joints[0] + vergence, math.nan])
         established = self._track.track_id is not None or self.class_name is not None or self._boxes.count > 0
         if established and not self._still_at_its_depth(vergence, stamp_s, now_s):
             self.note = "something at another depth lies at the fovea"
             return False
-        return self._believe(measurement, seen, sighting.skew_s, now_s, "fovea", may_jump=not established)
+        return self._believe(measurement, seen, sighting.skew_s, now_s, "fovea", may_jump=lambda: not established)
 
     def _still_at_its_depth(self, vergence_rad: float, stamp_s: float, now_s: float) -> bool:
         """Tell whether the fovea's vergence may be that of a target that was itself seen: not if something hides it."""
         if now_s - self._target_seen_s < _FRESH_S:
             return True
         estimate = self.estimate(stamp_s)
-        return estimate is not None and abs(vergence_rad - estimate.vergence_rad) < _SAME_DEPTH_RAD
+        return estimate is not None and abs(vergence_rad - estimate.vergence_rad) < SAME_DEPTH_RAD
 
     def see_box(self, sighting: BoxSighting, now_s: float) -> bool:
         """Take a detected target; True if it is what is wanted, by its class or by its place, and was believed."""
@@ -183,7 +177,7 @@ class TargetTracking:
             return False
         if not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
-        sigma = self._sigma(sighting.stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
+        sigma = self._exposures.sigma(sighting.stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
         measurement, seen = directions.box(self._history, sighting, sigma)
         vergence = float(seen[1] - seen[0])
         own_depth = _own_depth(vergence, sighting.extent_rad)
@@ -194,13 +188,19 @@ class TargetTracking:
             measurement, seen = directions.shifted(measurement, pan, tilt), seen + np.array([pan, pan, tilt])
         elif not self.filter.initialised:
             self._start_from(measurement)
-        believed = self._believe(
-            measurement, seen, sighting.skew_s, now_s, "box", may_jump=not by_class or self._boxes_may_jump(now_s)
-        )
+
+        def may_jump() -> bool:
+            if not by_class:
+                return True
+            expected = self.filter.at(sighting.stamp_s)
+            return self._rivals.may_be_the_target(sighting.stamp_s, seen, sighting.extent_rad, own_depth, expected)
+
+        believed = self._believe(measurement, seen, sighting.skew_s, now_s, "box", may_jump)
+        if believed:
+            self._rivals.found(sighting.stamp_s, self.filter.at(sighting.stamp_s))
         if believed or not by_class:
             self._agreement.see_box(sighting.stamp_s, vergence, math.sqrt(2.0) * sigma, own_depth)
             self._heed_boxes(sighting.stamp_s)
-        self._boxes_off_since_s = math.nan if believed else _first(self._boxes_off_since_s, now_s)
         return believed
 
     def _contains_target(self, sighting: BoxSighting, seen_rad: Array, own_depth_rad: float) -> bool:
@@ -212,12 +212,6 @@ class TargetTracking:
         if self._agreement.track_is_fresh(sighting.stamp_s, _BOX_LATE_S) and not self.doubtful:
             bound = self._p.disagreement_rad + own_depth_rad + 4.0 * float(estimate.sigmas_rad[1])
         return self._boxes.adopt(seen_rad, sighting.extent_rad, bound, estimate)
-
-    def _boxes_may_jump(self, now_s: float) -> bool:
-        """Tell whether boxes elsewhere may be the target's: not while the fovea sees its depth, for a while."""
-        off_s = now_s - _first(self._boxes_off_since_s, now_s)
-        seen_there = now_s - self._fovea_agreed_s < _SEEN_THERE_S
-        return off_s >= (self._p.distractor_patience_s if seen_there else _JUMP_PATIENCE_S)
 
     def _heed_boxes(self, stamp_s: float) -> None:
         """Let go of what the boxes say is not the target."""
@@ -245,11 +239,17 @@ class TargetTracking:
         return self._believe(measurement, seen, 0.0, now_s, "point")
 
     def _believe(
-        self, measurement: Measurement, seen_rad: Array, skew_s: float, now_s: float, source: str, may_jump: bool = True
+        self,
+        measurement: Measurement,
+        seen_rad: Array,
+        skew_s: float,
+        now_s: float,
+        source: str,
+        may_jump: Callable[[], bool] = lambda: True,
     ) -> bool:
         for variances in self._moves.take_before(measurement.stamp_s):
             self.filter.loosen(variances)
-        if not self.filter.update(measurement, may_jump):
+        if not (self.filter.update(measurement) or (may_jump() and self.filter.jump(measurement))):
             self.note = (
                 f"{source} differs from the prediction by {math.degrees(self.filter.last_innovation_rad):.1f} deg"
             )
@@ -262,9 +262,7 @@ class TargetTracking:
         error_rad = seen_rad - np.array([at_left[0], at_right[1], at_left[2]])
         self.visual = VisualError(measurement.stamp_s, seen_rad, error_rad)
         self.seen_s, self.source, self.note = now_s, source, ""
-        if source == "fovea":
-            self._fovea_agreed_s = now_s
-        else:
+        if source != "fovea":
             self._target_seen_s = now_s
         return True
 
@@ -277,33 +275,9 @@ class TargetTracking:
         self.filter.start(measurement.stamp_s, angles, np.diag(np.square([wide, sigma, wide])))
 
     def eyes_were_still(self, stamp_s: float, skew_s: float) -> bool:
-        """Tell whether the eyes turned slowly enough, and for long enough before, for a pair to be used.
-
-        Eyes that go along with a target have it as still before them as eyes at rest one that rests.
-        """
-        if not (math.isfinite(stamp_s) and math.isfinite(skew_s) and abs(skew_s) < 0.1):
-            return False
-        if not self._history.covers(stamp_s):
-            return False
-        first, last = min(stamp_s, stamp_s + skew_s), max(stamp_s, stamp_s + skew_s)
-        begin = first - self._p.settle_s
-        if self._history.speed_within(begin, last) < self._p.still_speed_rad_s:
-            return True
-        if not self.filter.moving:
-            return False
-        return self._history.speed_within(begin, last, self.joint_rates_rad_s(stamp_s)) < _CATCHING_UP_RAD_S
-
-    def _sigma(self, stamp_s: float, sigma_rad: float) -> float:
-        """Add what a few milliseconds of doubt about the stamps mean while the eyes move."""
-        speed = self._history.speed_within(stamp_s - 0.02, stamp_s + 0.001)
-        return math.hypot(sigma_rad, _TIMING_SIGMA_S * speed)
-
-    def _at_fovea(self, stamp_s: float) -> bool:
-        estimate = self.estimate(stamp_s)
-        if estimate is None:
-            return False
-        joints, target = self._history.shaft_at(stamp_s), estimate.joints_rad
-        return math.hypot(target[0] - joints[0], target[2] - joints[2]) <= self._p.fovea_radius_rad
+        """Tell whether the eyes turned slowly enough, and for long enough before, for a pair to be used."""
+        target = self.estimate(stamp_s) if math.isfinite(stamp_s) else None
+        return self._exposures.were_still(stamp_s, skew_s, target)
 
     def _is_wanted_track(self, sighting: TrackSighting, seen_rad: Array) -> bool:
         if self.class_name is not None or self.takes_stream:
@@ -313,16 +287,8 @@ class TargetTracking:
         estimate = self.estimate(sighting.stamp_s)
         if estimate is None or sighting.stamp_s < self._wanted_since_s:
             return False
-        joints = estimate.joints_rad
-        offset = (float(joints[0] - seen_rad[0]), float(joints[2] - seen_rad[2]))
-        deeper = float(seen_rad[1] - seen_rad[0]) - estimate.vergence_rad
         why_not = self._track.adopt(
-            sighting.track_id,
-            offset,
-            deeper if math.isfinite(deeper) else 0.0,
-            estimate,
-            self._p.adopt_radius_rad,
-            self._p.disagreement_rad,
+            sighting.track_id, seen_rad, estimate, self._p.adopt_radius_rad, self._p.disagreement_rad
         )
         self.note = why_not or self.note
         return not why_not
@@ -337,10 +303,6 @@ def _positive(sigma_rad: float, fallback_rad: float) -> float:
 def _own_depth(vergence_rad: float, extent_rad: float) -> float:
     """Return by how much vergence may differ over an object that is as deep as wide."""
     return abs(vergence_rad) * extent_rad if math.isfinite(extent_rad * vergence_rad) else 0.0
-
-
-def _first(since_s: float, now_s: float) -> float:
-    return since_s if math.isfinite(since_s) else now_s
 
 
 __all__ = ["SightingError", "TargetTracking"]

@@ -1,0 +1,54 @@
+"""What the eyes did while a pair was exposed: whether it may be used, and how sure a direction in it is."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_servo.gaze.joint_history import JointHistory
+from vergence_servo.gaze.parameters import GazeParameters
+from vergence_servo.gaze.target_filter import TargetEstimate
+
+Array = npt.NDArray[np.float64]
+
+_TIMING_SIGMA_S = 0.006
+"""Stamps are off by milliseconds, and between two reports of the joints nobody knows when they moved."""
+_CATCHING_UP_RAD_S = 2.0
+"""How fast the eyes may slip off a moving target: who must catch up cannot wait for a still image."""
+_LARGEST_SKEW_S = 0.1
+
+
+class Exposures:
+    """Holds the joints' history against exposures."""
+
+    def __init__(self, parameters: GazeParameters, history: JointHistory) -> None:
+        self._p, self._history = parameters, history
+
+    def were_still(self, stamp_s: float, skew_s: float, target: TargetEstimate | None) -> bool:
+        """Tell whether the eyes turned slowly enough, and for long enough before, for a pair to be used.
+
+        Eyes that go along with a target have it as still before them as eyes at rest one that rests.
+        """
+        if not (math.isfinite(stamp_s) and math.isfinite(skew_s) and abs(skew_s) < _LARGEST_SKEW_S):
+            return False
+        if not self._history.covers(stamp_s):
+            return False
+        first, last = min(stamp_s, stamp_s + skew_s), max(stamp_s, stamp_s + skew_s)
+        first -= self._p.settle_s
+        if self._history.speed_within(first, last) < self._p.still_speed_rad_s:
+            return True
+        if target is None or not target.moving:
+            return False
+        return self._history.speed_within(first, last, target.joint_rates_rad_s) < _CATCHING_UP_RAD_S
+
+    def sigma(self, stamp_s: float, sigma_rad: float) -> float:
+        """Add what a few milliseconds of doubt about the stamps mean while the eyes move."""
+        speed = self._history.speed_within(stamp_s - 0.02, stamp_s + 0.001)
+        return math.hypot(sigma_rad, _TIMING_SIGMA_S * speed)
+
+    def at_fovea(self, stamp_s: float, target: TargetEstimate | None) -> bool:
+        """Tell whether the target was at the left fovea."""
+        if target is None:
+            return False
+        joints, wanted = self._history.shaft_at(stamp_s), target.joints_rad
+        return math.hypot(wanted[0] - joints[0], wanted[2] - joints[2]) <= self._p.fovea_radius_rad
