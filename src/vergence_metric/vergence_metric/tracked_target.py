@@ -1,7 +1,9 @@
 """The target that the tracker holds: where it should be next, and at which disparity, however the eyes turn."""
 
+import itertools
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,6 +12,8 @@ from vergence_metric.eye_watch import EyeView, Pixel
 
 _MOTION_MEMORY = 0.6  # share of the old angular velocity kept at each frame
 _COAST_HALF_LIFE_S = 0.7  # a hidden target's predicted velocity fades: it may have stopped
+_COAST_FROM_S = 0.3  # a hidden target goes on as it went over this time, not as its last two sightings had it
+_SLOPE_OVER_S = 0.06
 
 
 @dataclass
@@ -27,23 +31,41 @@ class Target:
     hidden: bool = False
     right_seen_s: float = -math.inf
     absolute_rad: float = math.nan  # angle by which the right ray is turned against the left one, across
+    sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # of late: stamp and direction
 
     def predicted(self, stamp_s: float) -> np.ndarray:
         """Return the direction (3,) in which it should be seen now."""
         elapsed = stamp_s - self.seen_s
         rate = math.log(2.0) / _COAST_HALF_LIFE_S
-        travelled = elapsed if not self.hidden else (1.0 - math.exp(-rate * elapsed)) / rate
-        direction = self.direction + self.velocity * travelled
+        if self.hidden:
+            direction = self.direction + self._steady_velocity() * (1.0 - math.exp(-rate * elapsed)) / rate
+        else:
+            direction = self.direction + self.velocity * elapsed
         return np.asarray(direction / np.linalg.norm(direction))
 
     def moved(self, stamp_s: float, direction: np.ndarray) -> None:
         """Take where it is seen now."""
         elapsed = stamp_s - self.seen_s
-        if elapsed > 0.0:
-            velocity = (direction - self.direction) / elapsed
-            keep = _MOTION_MEMORY if not self.hidden else 0.0
-            self.velocity = keep * self.velocity + (1.0 - keep) * velocity if not self.hidden else self.velocity * 0.0
+        if self.hidden:
+            self.sightings.clear()
+            self.velocity = np.zeros(3)
+        elif elapsed > 0.0:
+            self.velocity = self.velocity + (1.0 - _MOTION_MEMORY) * (
+                (direction - self.direction) / elapsed - self.velocity
+            )
         self.direction, self.seen_s, self.hidden = direction, stamp_s, False
+        self.sightings.append((stamp_s, direction))
+        while self.sightings[0][0] < stamp_s - _COAST_FROM_S:
+            self.sightings.popleft()
+
+    def _steady_velocity(self) -> np.ndarray:
+        """Return its velocity over the last sightings (3,), whatever single ones say (Theil and Sen's median slope).
+
+        Eyes that turn fast are not quite where their joints say, and what hides a target pulls at it first.
+        """
+        pairs = itertools.combinations(self.sightings, 2)
+        slopes = [(b - a) / (t - s) for (s, a), (t, b) in pairs if t - s >= _SLOPE_OVER_S]
+        return np.median(slopes, axis=0) if slopes else np.zeros(3)
 
     def looked_at(self, center_px: Pixel) -> Pixel:
         """Return the pixel of the point that the eye looked at when it locked on, for a centre now."""

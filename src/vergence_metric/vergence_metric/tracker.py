@@ -180,12 +180,18 @@ class TargetTracker:
         if hidden_s > p.track_give_up_s:
             self._target, self._lost_s = None, stamp_s
             return self._without(TrackStatus.LOST, f"not seen for {hidden_s:.1f} s")
-        if not _inside(expected_px, left):
+        # It went on as predicted, or stayed where it was last seen.
+        places = [expected_px, views[0].pixel(target.direction)] if target.hidden else [expected_px]
+        places = [place for place in places if _inside(place, left)]
+        if not places:
             target.hidden = True
             return self._lost(target, f"predicted outside the left image, hidden for {hidden_s:.1f} s")
         if target.hidden:
             reach = round(p.track_search_px + p.track_search_growth_px_s * hidden_s)
-            sighting = target.looks.search(left, expected_px, reach)
+            if distance(places[0], places[-1]) < reach:
+                places = places[:1]
+            sightings = [target.looks.search(left, place, reach) for place in places]
+            sighting = max(sightings, key=lambda one: one.likeness)
             needed = p.track_reacquire_likeness
         else:
             sighting = target.looks.follow(left, expected_px)
