@@ -15,6 +15,7 @@ _TIMING_SIGMA_S = 0.006
 """Stamps are off by milliseconds, and between two reports of the joints nobody knows when they moved."""
 _CATCHING_UP_RAD_S = 2.0
 """How fast the eyes may slip off a moving target: who must catch up cannot wait for a still image."""
+_REPORT_S = 0.02
 _LARGEST_SKEW_S = 0.1
 
 
@@ -41,9 +42,10 @@ class Exposures:
             return False
         return self._history.speed_within(first, last, target.joint_rates_rad_s) < _CATCHING_UP_RAD_S
 
-    def sigma(self, stamp_s: float, sigma_rad: float) -> float:
+    def sigma(self, stamp_s: float, skew_s: float, sigma_rad: float) -> float:
         """Add what a few milliseconds of doubt about the stamps mean while the eyes move."""
-        speed = self._history.speed_within(stamp_s - 0.02, stamp_s + 0.001)
+        first, last = min(stamp_s, stamp_s + skew_s), max(stamp_s, stamp_s + skew_s)
+        speed = self._history.speed_within(first - _REPORT_S, last + 0.001)
         return math.hypot(sigma_rad, _TIMING_SIGMA_S * speed)
 
     def at_fovea(self, stamp_s: float, target: TargetEstimate | None) -> bool:

@@ -15,6 +15,7 @@ from vergence_servo.gaze.motion import Motion
 
 Array = npt.NDArray[np.float64]
 
+_TO_JOINTS = np.array([[1.0, -0.5, 0.0], [1.0, 0.5, 0.0], [0.0, 0.0, 1.0]])
 _EVIDENCE_FADE = 0.8
 _EVIDENCE_TO_MOVE = 7.0
 _EVIDENCE_TO_REST = -2.0
@@ -60,12 +61,17 @@ class TargetEstimate:
     @property
     def joints_rad(self) -> Array:
         """Joint angles (3,), pan_left, pan_right, tilt, that fixate the target."""
-        return _joints(self.angles_rad)
+        return _TO_JOINTS @ self.angles_rad
 
     @property
     def joint_rates_rad_s(self) -> Array:
         """How fast each joint (3,) turns while it follows the target."""
-        return _joints(self.rates_rad_s)
+        return _TO_JOINTS @ self.rates_rad_s
+
+    @property
+    def joint_sigmas_rad(self) -> Array:
+        """Standard deviations (3,) of the joint angles that fixate the target."""
+        return np.sqrt(np.diag(_TO_JOINTS @ self.covariance @ _TO_JOINTS.T))
 
     @property
     def sigmas_rad(self) -> Array:
@@ -283,12 +289,6 @@ def _speed(before: Measurement, after: Measurement) -> tuple[Array, float]:
     duration_s = after.stamp_s - before.stamp_s
     if not duration_s > 0.01:
         return np.zeros(3), prior
-    rates: Array = np.linalg.solve(after.coefficients, after.values - before.values) / duration_s
+    rates = np.asarray(np.linalg.solve(after.coefficients, after.values - before.values) / duration_s, dtype=np.float64)
     noise = 2.0 * float(np.max(after.sigmas)) ** 2 / duration_s**2
-    shrunk: Array = rates * (prior / (prior + noise))
-    return shrunk, prior * noise / (prior + noise)
-
-
-def _joints(angles: Array) -> Array:
-    version, vergence, tilt = angles
-    return np.array([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
+    return rates * (prior / (prior + noise)), prior * noise / (prior + noise)

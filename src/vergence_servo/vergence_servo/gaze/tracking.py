@@ -114,9 +114,10 @@ class TargetTracking:
         """Take a track; True if it was the target's and was believed."""
         if not sighting.usable or not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
-        sigma = self._exposures.sigma(sighting.stamp_s, self._p.direction_sigma_rad)
+        sigma = self._exposures.sigma(sighting.stamp_s, sighting.skew_s, self._p.direction_sigma_rad)
         disparity_sigma = _positive(sighting.sigma_rad, self._p.direction_sigma_rad)
         measurement, seen = directions.track(self._history, sighting, sigma, disparity_sigma)
+        self._heed_moves(sighting.stamp_s)
         if not self._is_wanted_track(sighting, seen):
             return False
         if math.isfinite(seen[1]):
@@ -142,10 +143,17 @@ class TargetTracking:
             stamp_s, self.estimate(stamp_s)
         ):
             return False
-        sigma = self._exposures.sigma(stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
+        sigma = self._exposures.sigma(
+            stamp_s, sighting.skew_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad)
+        )
         measurement = directions.fovea_vergence(self._history, stamp_s, sighting.skew_s, sighting.horizontal_rad, sigma)
+        # Between the two exposures the target has moved on before the right eye.
+        measurement = replace(
+            measurement, values=measurement.values - self.joint_rates_rad_s(stamp_s)[1] * sighting.skew_s
+        )
         vergence = float(measurement.values[0])
         joints = self._history.shaft_at(stamp_s)
+        self._heed_moves(stamp_s)
         self._agreement.see_fovea(stamp_s, vergence)
         self._depths.see_fovea(stamp_s, vergence)
         self._rivals.see_fovea(stamp_s, vergence, joints)
@@ -156,17 +164,20 @@ class TargetTracking:
             return False
         seen = np.array([math.nan, joints[0] + vergence, math.nan])
         established = self._track.track_id is not None or self.class_name is not None or self._boxes.count > 0
-        if established and not self._still_at_its_depth(vergence, stamp_s, now_s):
+        if established and not self._still_at_its_depth(vergence, sigma, stamp_s, now_s):
             self.note = "something at another depth lies at the fovea"
             return False
         return self._believe(measurement, seen, sighting.skew_s, now_s, "fovea", may_jump=lambda: not established)
 
-    def _still_at_its_depth(self, vergence_rad: float, stamp_s: float, now_s: float) -> bool:
+    def _still_at_its_depth(self, vergence_rad: float, sigma_rad: float, stamp_s: float, now_s: float) -> bool:
         """Tell whether the fovea's vergence may be that of a target that was itself seen: not if something hides it."""
-        if now_s - self._target_seen_s < _FRESH_S:
-            return True
         estimate = self.estimate(stamp_s)
-        return estimate is not None and abs(vergence_rad - estimate.vergence_rad) < SAME_DEPTH_RAD
+        if estimate is None:
+            return False
+        bound_rad = SAME_DEPTH_RAD
+        if now_s - self._target_seen_s < _FRESH_S:
+            bound_rad += 2.0 * (sigma_rad + float(estimate.sigmas_rad[1]))
+        return abs(vergence_rad - estimate.vergence_rad) < bound_rad
 
     def see_box(self, sighting: BoxSighting, now_s: float) -> bool:
         """Take a detected target; True if it is what is wanted, by its class or by its place, and was believed."""
@@ -177,8 +188,11 @@ class TargetTracking:
             return False
         if not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
-        sigma = self._exposures.sigma(sighting.stamp_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad))
+        sigma = self._exposures.sigma(
+            sighting.stamp_s, sighting.skew_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad)
+        )
         measurement, seen = directions.box(self._history, sighting, sigma)
+        self._heed_moves(sighting.stamp_s)
         vergence = float(seen[1] - seen[0])
         own_depth = _own_depth(vergence, sighting.extent_rad)
         if not by_class:
@@ -247,8 +261,7 @@ class TargetTracking:
         source: str,
         may_jump: Callable[[], bool] = lambda: True,
     ) -> bool:
-        for variances in self._moves.take_before(measurement.stamp_s):
-            self.filter.loosen(variances)
+        self._heed_moves(measurement.stamp_s)
         if not (self.filter.update(measurement) or (may_jump() and self.filter.jump(measurement))):
             self.note = (
                 f"{source} differs from the prediction by {math.degrees(self.filter.last_innovation_rad):.1f} deg"
@@ -265,6 +278,11 @@ class TargetTracking:
         if source != "fovea":
             self._target_seen_s = now_s
         return True
+
+    def _heed_moves(self, stamp_s: float) -> None:
+        """Let the filter know what the joints' moves before an exposure have made of what it knew."""
+        for variances in self._moves.take_before(stamp_s):
+            self.filter.loosen(variances)
 
     def _start_from(self, measurement: Measurement) -> None:
         """Begin the filter at a first sighting, with the vergence that is assumed while only one eye sees."""
