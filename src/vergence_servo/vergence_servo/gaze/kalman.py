@@ -35,21 +35,6 @@ class Measurement:
         """The pair's stamp: the first row's."""
         return float(self.stamps_s[0])
 
-    @property
-    def depth_row(self) -> Array | None:
-        """The combination (n,) of the rows that is the vergence; None if they leave the depth open."""
-        for i, row in enumerate(self.coefficients):
-            if row[0] == 0 and row[1] != 0:
-                return np.eye(len(self.values))[i] / row[1]
-        sideways = np.flatnonzero(self.coefficients[:, 0])
-        if sideways.size < 2:
-            return None
-        one, other = (int(i) for i in sideways[:2])
-        combination = np.zeros(len(self.values))
-        combination[one], combination[other] = -1.0, 1.0
-        between = float(combination @ self.coefficients[:, 1])
-        return combination / between if between != 0 else None
-
     def alike(self, other: "Measurement") -> bool:
         """Tell whether another measurement is of the same kind."""
         return np.array_equal(self.coefficients, other.coefficients)
@@ -68,10 +53,6 @@ class Fit:
     def loss(self) -> float:
         """Negative logarithm of the likelihood, but for a constant."""
         return 0.5 * (self.distance + math.log(np.linalg.det(self.spread)))
-
-    def depth_distance(self, row: Array) -> float:
-        """Return the squared distance of the vergence alone, which `row` (n,) picks."""
-        return float(row @ self.innovation) ** 2 / float(row @ self.spread @ row)
 
 
 class Kalman:

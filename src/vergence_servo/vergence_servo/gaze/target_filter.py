@@ -165,7 +165,7 @@ class TargetFilter:
             return False
         # A depth that fits says nothing against a direction that does not.
         self._outliers = [before for before in self._outliers if not before.alike(measurement)]
-        self._weigh(rest.loss - self._motion.loss(motion))
+        self._weigh(rest.loss - self._motion.loss(motion), len(measurement.values))
         self._take(measurement, motion)
         return True
 
@@ -203,22 +203,17 @@ class TargetFilter:
             self._time_s = stamp_s
 
     def _fits(self, measurement: Measurement, rest: Fit, motion: tuple[Fit, Fit]) -> bool:
-        """Tell whether a measurement may be of the target, by a model that is believed.
-
-        A manoeuvre may begin at any time, but sideways: its wide gate is no reason to take what lies at another depth.
-        """
+        """Tell whether a measurement may be of the target, by a model that is believed."""
         bound = self._bound(measurement)
         if not self._moving and rest.distance <= bound:
             return True
         believed = self._motion.weights > _BELIEVED
-        if any(fit.distance <= bound for fit, yes in zip(motion, believed, strict=True) if yes):
-            return True
-        row = measurement.depth_row
-        return row is not None and motion[1].distance <= bound and motion[0].depth_distance(row) <= self._gate
+        return any(fit.distance <= bound for fit, yes in zip(motion, believed, strict=True) if yes)
 
-    def _weigh(self, advantage: float) -> None:
+    def _weigh(self, advantage: float, rows: int) -> None:
         """Add to the evidence for motion; at its end the model at rest takes over where the target is."""
-        evidence = _EVIDENCE_FADE * self._evidence + max(min(advantage, 5.0), -3.0)
+        # One row alone does not tell much: a depth that stays says nothing of a direction that moves.
+        evidence = _EVIDENCE_FADE ** (rows / 3.0) * self._evidence + max(min(advantage, 5.0), -3.0)
         self._evidence = min(max(evidence, _EVIDENCE_BOUNDS[0]), _EVIDENCE_BOUNDS[1])
         if self._moving:
             if self._evidence < _EVIDENCE_TO_REST:
