@@ -163,6 +163,33 @@ def test_refinement_follows_a_face_that_one_eye_sees_much_narrower():
     assert found.horizontal_px == pytest.approx(np.mean(values), abs=0.15)
 
 
+def test_refinement_counts_a_side_face_that_one_eye_sees_too_narrow_to_match():
+    left = textured(8)
+    # As above, but the left eye sees a fifth of it: 24 columns of the right image are 4.8 of the left one.
+    right = shifted(left, lambda x, y: np.where(x < 160, 4.0, 4.0 - 0.8 * (x - 160)))
+    found = refine(
+        np.clip(left, 0, 255).astype(np.uint8),
+        right,
+        Box((104, 80, 168.8, 160), 0.9, 0, "c"),
+        Box((100, 80, 184, 160), 0.9, 0, "c"),
+    )
+    side_px = 4.0 - 0.8 * 12
+    assert found.horizontal_px == pytest.approx((120 * 4.0 + 28.8 * side_px) / 148.8, abs=0.5)
+
+
+def test_refinement_adds_no_side_face_where_the_other_eye_sees_none():
+    left = textured(9)
+    # The right eye sees 20 columns more at the side, the left one none of them: its box ends where the face begins.
+    right = shifted(left, lambda x, y: np.where(x < 160, 4.0, 4.0 - (x - 160)))
+    found = refine(
+        np.clip(left, 0, 255).astype(np.uint8),
+        right,
+        Box((104, 80, 164, 160), 0.9, 0, "c"),
+        Box((100, 80, 180, 160), 0.9, 0, "c"),
+    )
+    assert found.horizontal_px == pytest.approx(4.0, abs=0.25)
+
+
 def test_refinement_leaves_the_background_out():
     left = textured(6)
     # A disc of disparity 12 before a wall of -8, in boxes whose corners show the wall.

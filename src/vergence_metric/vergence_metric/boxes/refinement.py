@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vergence_metric.boxes.crop import Crop
 from vergence_metric.boxes.dense_matching import DenseView, match_densely
 from vergence_metric.boxes.detections import Box
+from vergence_metric.boxes.side_faces import side_values
 from vergence_metric.boxes.uncertainty import surface_sigma_px
 
 _COARSE_PX = 24  # width to which a box is shrunk for the first match
@@ -60,19 +61,25 @@ def refine(left: NDArray[Any], right: NDArray[Any], left_box: Box, right_box: Bo
         return _nothing("no place in the boxes could be matched")
     depth_px = max(_LEAST_DEPTH_PX, _DEPTH_SHARE * width)
     # As the object's pixels in both images count, so do those of both views.
-    values = np.concatenate([_near(view, depth_px) for view in (dense.left, dense.right)])
+    near = tuple(_near(view, depth_px) for view in (dense.left, dense.right))
+    values = np.concatenate(
+        [view.disparity_px[kept] for view, kept in zip((dense.left, dense.right), near, strict=True)]
+    )
     share = len(values) / max(int(dense.left.inside.sum() + dense.right.inside.sum()), 1)
     if share < _LEAST_SHARE:
         return _nothing("too little of the boxes could be matched")
-    return Refinement(float(values.mean()), dense.vertical_px, surface_sigma_px(left_box, share), share)
+    aside = side_values(dense, left_box, right_box, near)
+    mean = (float(values.sum()) + sum(aside)) / (len(values) + len(aside))
+    return Refinement(mean, dense.vertical_px, surface_sigma_px(left_box, share), share)
 
 
-def _near(view: DenseView, depth_px: float) -> NDArray[np.float32]:
-    """Return the disparities (K,) of what is in a box and no further from the middle than its object can be."""
-    values = view.disparity_px[view.found]
-    if not values.size:
-        return values
-    return np.asarray(values[np.abs(values - np.median(values)) <= depth_px])
+def _near(view: DenseView, depth_px: float) -> NDArray[np.bool_]:
+    """Return where (h, w) a match is in the box and no further from the middle than its object can be."""
+    if not view.found.any():
+        return view.found
+    middle = np.median(view.disparity_px[view.found])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(view.found & (np.abs(view.disparity_px - middle) <= depth_px))
 
 
 def _coarse(left: NDArray[Any], right: NDArray[Any], left_box: Box, right_box: Box) -> tuple[float, float] | None:
