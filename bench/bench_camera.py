@@ -34,6 +34,7 @@ from vergence_common.stamps import to_nanoseconds
 
 RATE_HZ = 30
 SIZES = {"": (640, 480), ".720p": (1280, 720)}
+_WEBCAM_QUALITY = 75
 _MEASURE_S = 12.0
 _START_S = 30.0
 _EYES = ("left", "right")
@@ -74,18 +75,23 @@ def run(say: Callable[[str], None]) -> list[Row]:
 
 
 def record(path: Path, size_px: tuple[int, int], frames: int = 90) -> float:
-    """Write a Motion-JPEG AVI of a textured, moving scene with sensor noise; return the mean picture in kB."""
+    """Write a Motion-JPEG AVI of a textured, moving scene with sensor noise; return the mean picture in kB.
+
+    The pictures are as large as a webcam's, and like a webcam's they all have one header: ffmpeg's own encoder would
+    give each picture tables of its own.
+    """
     width, height = size_px
     random = np.random.default_rng(0)
     scene = random.integers(0, 256, (height // 16, width // 16 + 60, 3), dtype=np.uint8)
     scene = cv2.resize(scene, None, fx=16, fy=16, interpolation=cv2.INTER_CUBIC)
-    # ffmpeg's pictures are as large as a webcam's, OpenCV's own writer makes them twice that.
-    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"MJPG"), RATE_HZ, size_px)
+    encoded_already = [cv2.VIDEOWRITER_PROP_RAW_VIDEO, 1]
+    mjpg = cv2.VideoWriter.fourcc(*"MJPG")
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, mjpg, RATE_HZ, size_px, encoded_already)
     for number in range(frames):
         shift = 4 * number
         picture: npt.NDArray[np.int16] = scene[:height, shift : shift + width].astype(np.int16)
-        noise = random.normal(0.0, 3.0, picture.shape).astype(np.int16)
-        writer.write(np.clip(picture + noise, 0, 255).astype(np.uint8))
+        noisy = np.clip(picture + random.normal(0.0, 3.0, picture.shape).astype(np.int16), 0, 255).astype(np.uint8)
+        writer.write(cv2.imencode(".jpg", noisy, [cv2.IMWRITE_JPEG_QUALITY, _WEBCAM_QUALITY])[1].reshape(1, -1))
     writer.release()
     return path.stat().st_size / frames / 1e3
 
@@ -96,7 +102,7 @@ def measure(commands: Sequence[Sequence[str]], file: Path, duration_s: float = _
     A frame is lost if its picture of `file` never comes although later ones do; that cannot be told of pictures that
     were encoded anew (NaN).
     """
-    numbers = {bytes(picture.data): number for number, picture in enumerate(AviRecording(file).pictures())}
+    numbers = {picture: number for number, picture in enumerate(AviRecording(file).pictures())}
     with own_domain() as domain, contextlib.ExitStack() as stack:
         context = Context()
         rclpy.init(args=[], context=context, domain_id=domain)

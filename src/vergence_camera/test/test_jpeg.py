@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vergence_camera import jpeg
 from vergence_camera.errors import CorruptFrameError
 from vergence_camera.jpeg import inspect_jpeg
 
@@ -81,7 +82,7 @@ def test_a_missing_end_can_be_let_pass(make_jpeg: Make) -> None:
     assert inspect_jpeg(cut, must_be_whole=False).width_px == 640
 
 
-def test_the_memory_of_the_last_header_changes_nothing(make_jpeg: Make) -> None:
+def test_the_memory_of_headers_changes_nothing(make_jpeg: Make) -> None:
     """A stream's headers are alike, but the next frame may be of another size, or damaged in its header."""
     small, large = make_jpeg(0, 64, 48), make_jpeg(0, 320, 240)
     for data, width in ((small, 64), (make_jpeg(1, 64, 48), 64), (large, 320), (small, 64)):
@@ -91,3 +92,26 @@ def test_the_memory_of_the_last_header_changes_nothing(make_jpeg: Make) -> None:
             inspect_jpeg(small[:cut])
     with pytest.raises(CorruptFrameError):
         inspect_jpeg(b"\xff\xd8" + bytes(20) + small[22:])
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.data())
+def test_a_damaged_picture_is_judged_alike_whether_its_header_was_seen_before_or_not(
+    make_jpeg: Make, data: st.DataObject
+) -> None:
+    whole = make_jpeg(0, 64, 48)
+    cut = data.draw(st.integers(0, len(whole)))
+    place = data.draw(st.integers(0, len(whole) - 1))
+    damaged = (whole[:place] + data.draw(st.binary(max_size=3)) + whole[place + 1 :])[:cut]
+
+    def verdict() -> object:
+        try:
+            return inspect_jpeg(damaged, must_be_whole=False)
+        except CorruptFrameError as error:
+            return str(error)
+
+    jpeg._known_heads.clear()
+    fresh = verdict()
+    inspect_jpeg(whole)
+    assert verdict() == fresh
+    assert verdict() == fresh

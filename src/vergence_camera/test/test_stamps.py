@@ -16,8 +16,8 @@ class Clocks:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.monotonic_ns, self.wall_ns, self.ros_ns = 10**12, 1_700_000_000 * 10**9, 5 * 10**9
-        monkeypatch.setattr("vergence_camera.frame.time.monotonic_ns", lambda: self.monotonic_ns)
-        monkeypatch.setattr("vergence_camera.frame.time.time_ns", lambda: self.wall_ns)
+        monkeypatch.setattr(Clock.MONOTONIC, "now_ns", lambda: self.monotonic_ns)
+        monkeypatch.setattr(Clock.WALL, "now_ns", lambda: self.wall_ns)
 
     def advance(self, ns: int) -> None:
         self.monotonic_ns += ns

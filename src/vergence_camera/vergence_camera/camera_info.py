@@ -2,7 +2,6 @@
 
 import math
 import os
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,8 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import yaml
+
+from vergence_rig.atomic_file import write_atomically
 
 DISTORTION_LENGTHS = {"plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14), "equidistant": (4,)}
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -83,18 +84,8 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
 
 
 def write_yaml(document: dict[str, Any], path: Path) -> None:
-    """Write a document beside `path` first and then into its place, so that no reader sees half of it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    text = yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
-    descriptor, partial = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.chmod(partial, 0o644)
-        os.replace(partial, path)
-    except BaseException:
-        os.unlink(partial)
-        raise
+    """Write a document so that no reader sees half of it; raise OSError if that cannot be done."""
+    write_atomically(path, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))
 
 
 def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -> Path:

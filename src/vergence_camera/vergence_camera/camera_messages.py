@@ -9,6 +9,8 @@ from std_msgs.msg import Header
 from vergence_camera.camera_info import Calibration
 from vergence_camera.v4l2.controls import ControlSpec
 
+_LITTLE_ENDIAN = b"\0\1\0\0"
+
 
 class JpegSerializer:
     """JPEG bytes to a serialised sensor_msgs/CompressedImage (CDR, little endian; OMG DDSI-RTPS 10).
@@ -19,12 +21,12 @@ class JpegSerializer:
 
     def __init__(self, frame_id: str) -> None:
         self._names = _cdr_text(frame_id) + _cdr_text("jpeg")
+        self._head = struct.Struct(f"<4siI{len(self._names)}sI")
 
     def __call__(self, jpeg: bytes, stamp_ns: int) -> bytes:
         """Return the message with the JPEG's bytes as they are, for `publisher.publish`."""
         seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-        head = struct.pack("<4siI", b"\0\1\0\0", seconds, nanoseconds)
-        return b"".join((head, self._names, struct.pack("<I", len(jpeg)), jpeg))
+        return self._head.pack(_LITTLE_ENDIAN, seconds, nanoseconds, self._names, len(jpeg)) + jpeg
 
 
 def _cdr_text(text: str) -> bytes:

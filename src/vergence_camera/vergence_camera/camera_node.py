@@ -33,8 +33,6 @@ from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import from_nanoseconds
 from vergence_rig.rig import load_rig
 
-_LOOK_AROUND_NS = 200_000_000
-
 
 class CameraNode(Node):
     """Publishes one camera. `kernel` and `tree` replace the machine's own in tests; the rest goes to Node."""
@@ -54,9 +52,12 @@ class CameraNode(Node):
 
         diagnostics = Diagnostics(self, hardware_id=settings.device)
         qos = watch_qos(self, diagnostics)
-        self._compressed = qos.create_publisher(CompressedImage, "image_raw/compressed", IMAGE_QOS)
-        self._raw = qos.create_publisher(Image, "image_raw", IMAGE_QOS)
-        self._info = qos.create_publisher(CameraInfo, "camera_info", IMAGE_QOS)
+        self._wanted = (False, False, False)
+        topics = ((CompressedImage, "image_raw/compressed"), (CameraInfo, "camera_info"), (Image, "image_raw"))
+        self._publishers_of_frames = tuple(
+            qos.create_publisher(kind, topic, IMAGE_QOS, matched=self._on_matched) for kind, topic in topics
+        )
+        self._compressed, self._info, self._raw = self._publishers_of_frames
         self._calibration = NodeCalibration(self, settings.camera_info_url, settings.camera_name or eye or "camera")
         self._partner: Partner | None = None
         if settings.partner:
@@ -67,8 +68,9 @@ class CameraNode(Node):
         diagnostics.add("controls", self._controls.report)
 
         self._health = Health()
-        self._stamper = Stamper(self._ros_now_ns)
-        self._look_around(time.monotonic_ns())
+        self._stamper = Stamper(time.time_ns)
+        self._see_clock()
+        self.add_post_set_parameters_callback(self._see_clock)
         source = make_source(
             settings.device, settings.source_options(), kernel=kernel, tree=self._tree, user=self._port
         )
@@ -100,14 +102,13 @@ class CameraNode(Node):
         """Publish one frame, in the capture thread; each form only if someone listens to it."""
         began_ns = time.monotonic_ns()
         try:
-            if began_ns >= self._look_again_ns:
-                self._look_around(began_ns)
-            if self._wanted[0]:
+            jpeg_wanted, info_wanted, raw_wanted = self._wanted
+            if jpeg_wanted:
                 self._compressed.publish(self._serialise(self._jpeg(frame), stamp.ros_ns))
-            if self._wanted[1]:
+            if info_wanted:
                 header = self._header(stamp)
                 self._info.publish(self._calibration.message(frame.width_px, frame.height_px, header))
-            if self._wanted[2]:
+            if raw_wanted:
                 pixels, encoding = decode(frame)
                 self._raw.publish(array_to_image(pixels, self._header(stamp), encoding))
         except CorruptFrameError as error:
@@ -121,21 +122,23 @@ class CameraNode(Node):
             self._partner.skew.own(stamp.ros_ns)
         self._health.published((stamp.age_ns + time.monotonic_ns() - began_ns) * 1e-9)
 
-    def _look_around(self, now_ns: int) -> None:
-        """See who listens and which clock rules. Doing this for every frame would cost as much as publishing it."""
-        publishers = (self._compressed, self._info, self._raw)
-        self._wanted = tuple(publisher.get_subscription_count() > 0 for publisher in publishers)
-        self._simulated = bool(self.get_parameter("use_sim_time").value)
-        self._look_again_ns = now_ns + _LOOK_AROUND_NS
+    def _on_matched(self, _: object) -> None:
+        """See who listens, now that one came or went. To ask for every frame would cost as much as to send it."""
+        self._wanted = tuple(publisher.get_subscription_count() > 0 for publisher in self._publishers_of_frames)
 
-    def _ros_now_ns(self) -> int:
-        return self.get_clock().now().nanoseconds if self._simulated else time.time_ns()
+    def _see_clock(self, _: object = None) -> None:
+        # Without simulated time ROS time is the wall clock, and reading that directly costs a tenth.
+        simulated = self.get_parameter("use_sim_time").value
+        self._stamper.ros_now_ns = self._simulated_now_ns if simulated else time.time_ns
+
+    def _simulated_now_ns(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
 
     def _header(self, stamp: Stamp) -> Header:
         return Header(stamp=from_nanoseconds(stamp.ros_ns), frame_id=self._frame_id)
 
     def _jpeg(self, frame: Frame) -> bytes:
-        if frame.encoding is Encoding.JPEG and isinstance(frame.data, bytes):
+        if isinstance(frame.data, bytes) and frame.encoding is Encoding.JPEG:
             return frame.data
         return encode_jpeg(decode(frame)[0], self._settings.value.jpeg_quality)
 
@@ -182,7 +185,7 @@ class CameraNode(Node):
 
     def _end(self) -> None:
         """Let the last frames arrive, then end the process: a recording that is played once is a finite task."""
-        for publisher in (self._compressed, self._raw, self._info):
+        for publisher in self._publishers_of_frames:
             publisher.wait_for_all_acked(Duration(seconds=1))
         self.context.try_shutdown()
 

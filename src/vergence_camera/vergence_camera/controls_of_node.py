@@ -13,7 +13,6 @@ from vergence_camera.errors import CameraError
 from vergence_common.diagnostics import OK, WARN, Report
 
 PREFIX = "control."
-_PERIOD_S = 1.0
 
 
 class NodeControls:
@@ -40,7 +39,6 @@ class NodeControls:
             if name.startswith(PREFIX)
         }
         port.want(self._given)
-        node.create_timer(_PERIOD_S, self.update)
         self._lock, self._lock_after_s = "off", 0.0
 
     def configure(self, lock: str, lock_after_s: float) -> None:
@@ -68,7 +66,8 @@ class NodeControls:
             self._followed = None if self._trouble else state
 
     def report(self) -> Report:
-        """Return the diagnostic."""
+        """Look after the controls (see `update`; a timer of its own would do that no more often) and report on them."""
+        self.update()
         values = dict(self._port.values())
         if not values:
             return Report(OK, "no controls: a recording, a stream, or a camera that is away")

@@ -12,14 +12,13 @@ Pixels = npt.NDArray[np.uint8]
 
 
 class Clock(Enum):
-    """The clock that a capture time was read from."""
+    """The clock that a capture time was read from; `now_ns()` is its reading now, in nanoseconds."""
 
     MONOTONIC = "monotonic"
     WALL = "wall"
 
-    def now_ns(self) -> int:
-        """Return this clock's reading now, in nanoseconds."""
-        return time.monotonic_ns() if self is Clock.MONOTONIC else time.time_ns()
+    def __init__(self, name: str) -> None:
+        self.now_ns = time.monotonic_ns if name == "monotonic" else time.time_ns
 
 
 class Encoding(Enum):

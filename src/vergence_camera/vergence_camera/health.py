@@ -1,7 +1,6 @@
 """Everything that is counted about one camera; written by the capture thread, read by diagnostics."""
 
 import statistics
-import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable
@@ -61,88 +60,79 @@ class _Counts:
 
 
 class Health:
-    """Thread-safe counters. `now_s` is a steady clock."""
+    """Counters that one thread writes and any may read. `now_s` is a steady clock."""
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
         self._now_s = now_s
-        self._lock = threading.Lock()
         self._counts = _Counts()
         self._arrivals_s: deque[float] = deque(maxlen=_WINDOW)
         self._delays_s: deque[float] = deque(maxlen=_WINDOW)
         self._mode: Mode | None = None
         self._was_connected = self._connected = self._ended = False
         self._last_fault = ""
-        self._last_sequence: int | None = None
+        self._expected: int | None = None
         self._corrupt_since_last = 0
 
     def connected(self, mode: Mode) -> None:
         """The stream has begun, or begun again."""
-        with self._lock:
-            self._counts.reconnects += int(self._was_connected)
-            self._was_connected = self._connected = True
-            self._mode, self._last_sequence, self._corrupt_since_last = mode, None, 0
-            self._arrivals_s.clear()
+        self._counts.reconnects += int(self._was_connected)
+        self._mode, self._expected, self._corrupt_since_last = mode, None, 0
+        self._was_connected = self._connected = True
+        self._arrivals_s.clear()
 
     def fault(self, error: CameraError) -> None:
         """The stream has failed, or could not be begun."""
-        with self._lock:
-            self._connected = False
-            self._counts.faults[error.kind] += 1
-            self._last_fault = str(error)
+        self._connected = False
+        self._counts.faults[error.kind] += 1
+        self._last_fault = str(error)
 
     def corrupt(self, error: CameraError) -> None:
         """One frame was not whole and has been dropped."""
-        with self._lock:
-            self._counts.corrupt += 1
-            self._corrupt_since_last += 1
-            self._counts.faults[error.kind] += 1
-            self._last_fault = str(error)
+        self._counts.corrupt += 1
+        self._corrupt_since_last += 1
+        self._counts.faults[error.kind] += 1
+        self._last_fault = str(error)
 
     def received(self, sequence: int, skipped: int) -> None:
         """A whole frame came; `skipped` older ones were dropped for it."""
-        with self._lock:
-            if self._last_sequence is not None:
-                missing = sequence - self._last_sequence - 1 - skipped - self._corrupt_since_last
-                self._counts.lost_before_us += max(0, missing)
-            self._last_sequence, self._corrupt_since_last = sequence, 0
+        if sequence != self._expected:
             self._counts.skipped += skipped
-            self._arrivals_s.append(self._now_s())
+            if self._expected is not None:
+                self._counts.lost_before_us += max(0, sequence - self._expected - skipped - self._corrupt_since_last)
+        self._expected, self._corrupt_since_last = sequence + 1, 0
+        self._arrivals_s.append(self._now_s())
 
     def too_old(self) -> None:
         """A frame was older than asked and has been dropped."""
-        with self._lock:
-            self._counts.too_old += 1
+        self._counts.too_old += 1
 
     def published(self, stamp_to_publish_s: float) -> None:
         """A frame has gone out, that long after its stamp."""
-        with self._lock:
-            self._counts.frames += 1
-            self._delays_s.append(stamp_to_publish_s)
+        self._counts.frames += 1
+        self._delays_s.append(stamp_to_publish_s)
 
     def ended(self) -> None:
         """A recording has been played to its end."""
-        with self._lock:
-            self._ended, self._connected = True, False
+        self._ended, self._connected = True, False
 
     def snapshot(self) -> Snapshot:
         """Return the present state."""
-        with self._lock:
-            arrivals, counts = self._arrivals_s, self._counts
-            nan = float("nan")
-            span = arrivals[-1] - arrivals[0] if len(arrivals) > 1 else 0.0
-            return Snapshot(
-                connected=self._connected,
-                ended=self._ended,
-                mode=self._mode,
-                frames=counts.frames,
-                rate_hz=(len(arrivals) - 1) / span if span > 0.0 else nan,
-                age_s=self._now_s() - arrivals[-1] if arrivals else nan,
-                stamp_to_publish_s=statistics.median(self._delays_s) if self._delays_s else nan,
-                lost_before_us=counts.lost_before_us,
-                skipped=counts.skipped,
-                too_old=counts.too_old,
-                corrupt=counts.corrupt,
-                reconnects=counts.reconnects,
-                faults=dict(counts.faults),
-                last_fault=self._last_fault,
-            )
+        arrivals, delays_s, counts = list(self._arrivals_s), list(self._delays_s), self._counts
+        nan = float("nan")
+        span = arrivals[-1] - arrivals[0] if len(arrivals) > 1 else 0.0
+        return Snapshot(
+            connected=self._connected,
+            ended=self._ended,
+            mode=self._mode,
+            frames=counts.frames,
+            rate_hz=(len(arrivals) - 1) / span if span > 0.0 else nan,
+            age_s=self._now_s() - arrivals[-1] if arrivals else nan,
+            stamp_to_publish_s=statistics.median(delays_s) if delays_s else nan,
+            lost_before_us=counts.lost_before_us,
+            skipped=counts.skipped,
+            too_old=counts.too_old,
+            corrupt=counts.corrupt,
+            reconnects=counts.reconnects,
+            faults=dict(counts.faults),
+            last_fault=self._last_fault,
+        )

@@ -1,7 +1,7 @@
 """Look into a JPEG without decoding it: its size, and whether it is whole (ITU-T T.81, annex B)."""
 
 import re
-from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 from vergence_camera.errors import CorruptFrameError
 
@@ -10,12 +10,14 @@ _FRAME_HEADERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _START_OF_SCAN = 0xDA
 # Inside entropy-coded data 0xFF is stuffed with 0x00; only restart markers may stand there.
 _MARKER_IN_SCAN = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
-_last_header: tuple[bytes, tuple[int, int, int]] | None = None
+_SCAN = b"\xff\xda"
+_Header: TypeAlias = tuple[int, tuple[int, int, int]]
+_known_heads: dict[bytes, _Header] = {}
+_MOST_HEADS = 64
 _BETWEEN_SCANS = frozenset({0xC4, 0xDA, 0xDB, 0xDC, 0xDD, 0xFE})
 
 
-@dataclass(frozen=True)
-class JpegInfo:
+class JpegInfo(NamedTuple):
     """Size in pixels, number of colour components, and where the picture ends in the bytes."""
 
     width_px: int
@@ -37,39 +39,42 @@ def inspect_jpeg(data: bytes, *, must_be_whole: bool = True) -> JpegInfo:
     Raises:
         CorruptFrameError: no picture, no size, or not whole.
     """
-    if data[:2] != _START:
+    if not data.startswith(_START):
         raise CorruptFrameError(f"frame of {len(data)} bytes does not begin like a JPEG (ff d8): {data[:4].hex(' ')}")
-    known = _last_header
-    if known is not None and data.startswith(known[0]):
-        position, size = len(known[0]), known[1]
-    else:
-        position, size = _read_header(data)
+    head = data[: data.find(_SCAN, 2) + 4]
+    known = _known_heads.get(head)
+    if known is None or known[0] > len(data):
+        known = _read_header(data, head)
+    position, size = known
     end = _end_of_scans(data, position)
-    if end is None:
+    if end < 0:
         if must_be_whole:
             raise CorruptFrameError(f"JPEG of {len(data)} bytes has no end marker or a foreign one in its data")
         end = len(data)
     return JpegInfo(*size, end)
 
 
-def _read_header(data: bytes) -> tuple[int, tuple[int, int, int]]:
-    """Return where the coded data begins, and width, height and components; remember them for the next frame.
+def _read_header(data: bytes, head: bytes) -> _Header:
+    """Return where the coded data begins, and width, height and components.
 
-    A camera's header is the same in every frame, so that it is parsed once.
+    Cameras send few different headers, often one: they are remembered by their bytes up to the scan's marker.
     """
-    global _last_header
-    position, size = 2, None
+    begin, size = 2, None
     while True:
-        code, payload, position = _segment(data, position)
+        code, payload, position = _segment(data, begin)
         if code in _FRAME_HEADERS:
             if len(payload) < 6:
                 raise CorruptFrameError("JPEG frame header is cut short")
             size = (payload[3] << 8 | payload[4], payload[1] << 8 | payload[2], payload[5])
         if code == _START_OF_SCAN:
             break
+        begin = position
     if size is None or 0 in size:
         raise CorruptFrameError("JPEG has no size before its first scan")
-    _last_header = (data[:position], size)
+    if begin + 4 == len(head):
+        if len(_known_heads) >= _MOST_HEADS:
+            _known_heads.clear()
+        _known_heads[head] = (position, size)
     return position, size
 
 
@@ -86,15 +91,15 @@ def _segment(data: bytes, position: int) -> tuple[int, bytes, int]:
     return head[1], data[position + 4 : end], end
 
 
-def _end_of_scans(data: bytes, position: int) -> int | None:
+def _end_of_scans(data: bytes, position: int) -> int:
+    """Return where the end marker ends, -1 if there is none or a foreign one before it."""
     while (found := _MARKER_IN_SCAN.search(data, position)) is not None:
-        code = data[found.start() + 1]
-        if code == _END[1]:
+        if found[0] == _END:
             return found.end()
-        if code not in _BETWEEN_SCANS:
-            return None
+        if found[0][1] not in _BETWEEN_SCANS:
+            return -1
         try:
             position = _segment(data, found.start())[2]
         except CorruptFrameError:
-            return None
-    return None
+            return -1
+    return -1

@@ -16,14 +16,14 @@ class Stamp(NamedTuple):
 
 
 class Stamper:
-    """Stamps frames in ROS time, strictly increasing.
+    """Stamps frames in ROS time, strictly increasing; `ros_now_ns` reads it and may be replaced at any time.
 
     The conversion is made afresh for each frame: its age is read on the clock that its capture time came from, and
     taken from ROS time now. A wall clock that is stepped, or simulated time, is thereby followed at once.
     """
 
     def __init__(self, ros_now_ns: Callable[[], int]) -> None:
-        self._ros_now_ns = ros_now_ns
+        self.ros_now_ns = ros_now_ns
         self._last_stamp_ns = self._last_now_ns = 0
         self.pushed_forward = 0
         self.clock_jumps = 0
@@ -39,8 +39,12 @@ class Stamper:
             A stamp later than every one before it, unless ROS time itself has jumped back. The age includes the
             offset.
         """
-        ros_ns, here_ns = self._read_both(frame.clock)
-        age_ns = max(0, here_ns - frame.time_ns) + round(offset_s * 1e9)
+        now_ns = frame.clock.now_ns
+        before, ros_ns, after = now_ns(), self.ros_now_ns(), now_ns()
+        if after - before >= _STEADY_READING_NS:
+            before, ros_ns, after = self._read_again(frame.clock, (before, ros_ns, after))
+        here_ns = (before + after) // 2
+        age_ns = max(0, here_ns - frame.time_ns) + int(offset_s * 1e9)
         stamp_ns = ros_ns - age_ns
         if ros_ns < self._last_now_ns:
             self.clock_jumps += 1
@@ -50,16 +54,12 @@ class Stamper:
         self._last_stamp_ns, self._last_now_ns = stamp_ns, ros_ns
         return Stamp(stamp_ns, age_ns)
 
-    def _read_both(self, clock: Clock) -> tuple[int, int]:
-        """Read ROS time and `clock` at one instant; a reading that was interrupted is made again."""
-        best: tuple[int, int, int] | None = None
-        for _ in range(3):
-            before = clock.now_ns()
-            ros_ns = self._ros_now_ns()
-            after = clock.now_ns()
-            if best is None or after - before < best[0]:
-                best = (after - before, ros_ns, (before + after) // 2)
-            if best[0] < _STEADY_READING_NS:
+    def _read_again(self, clock: Clock, first: tuple[int, int, int]) -> tuple[int, int, int]:
+        """Return the best of up to three readings of `clock`, ROS time and `clock`: the first was interrupted."""
+        best = first
+        for _ in range(2):
+            again = clock.now_ns(), self.ros_now_ns(), clock.now_ns()
+            best = min(best, again, key=lambda reading: reading[2] - reading[0])
+            if best[2] - best[0] < _STEADY_READING_NS:
                 break
-        assert best is not None
-        return best[1], best[2]
+        return best

@@ -26,6 +26,7 @@ class Diagnostics:
         self._node = node
         self._hardware_id = hardware_id
         self._sources: dict[str, Callable[[], Report]] = {}
+        self._message, self._statuses = DiagnosticArray(), dict[str, DiagnosticStatus]()
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._timer = node.create_timer(PERIOD_S, self.publish)
 
@@ -45,19 +46,23 @@ class Diagnostics:
 
     def publish(self) -> None:
         """Publish all reports."""
-        message = DiagnosticArray()
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        message.status = [self._status(name, report) for name, report in self.collect().items()]
-        self._publisher.publish(message)
+        self._message.header.stamp = self._node.get_clock().now().to_msg()
+        self._message.status = [self._status(name, report) for name, report in self.collect().items()]
+        self._publisher.publish(self._message)
 
     def _status(self, name: str, report: Report) -> DiagnosticStatus:
-        return DiagnosticStatus(
-            level=bytes([report.level]),
-            name=f"{self._node.get_fully_qualified_name().lstrip('/')}: {name}",
-            message=report.message,
-            hardware_id=self._hardware_id,
-            values=[KeyValue(key=str(key), value=_text(value)) for key, value in report.values.items()],
-        )
+        """Return the status, made once per name and set of figures: making messages anew costs most of a report."""
+        status = self._statuses.get(name)
+        if status is None or [entry.key for entry in status.values] != list(report.values):
+            status = self._statuses[name] = DiagnosticStatus(
+                name=f"{self._node.get_fully_qualified_name().lstrip('/')}: {name}",
+                hardware_id=self._hardware_id,
+                values=[KeyValue(key=key) for key in report.values],
+            )
+        status.level, status.message = bytes([report.level]), report.message
+        for entry, value in zip(status.values, report.values.values(), strict=True):
+            entry.value = _text(value)
+        return status
 
 
 def _text(value: object) -> str:

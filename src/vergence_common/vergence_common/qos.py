@@ -7,6 +7,7 @@ from typing import Any
 from rclpy.event_handler import (
     PublisherEventCallbacks,
     QoSOfferedIncompatibleQoSInfo,
+    QoSPublisherMatchedInfo,
     QoSRequestedIncompatibleQoSInfo,
     SubscriptionEventCallbacks,
 )
@@ -35,8 +36,14 @@ class QosWatch:
         self._mismatches: Counter[str] = Counter()
         diagnostics.add("qos", self.report)
 
-    def create_publisher(self, message_type: Any, topic: str, qos: QoSProfile = STATE_QOS) -> Publisher:
-        """As Node.create_publisher, overridable and watched."""
+    def create_publisher(
+        self,
+        message_type: Any,
+        topic: str,
+        qos: QoSProfile = STATE_QOS,
+        matched: Callable[[QoSPublisherMatchedInfo], None] | None = None,
+    ) -> Publisher:
+        """As Node.create_publisher, overridable and watched; `matched` is called when a subscriber comes or goes."""
 
         def mismatch(event: QoSOfferedIncompatibleQoSInfo) -> None:
             self._count(topic, "a subscriber asks for more than is offered", event.last_policy_kind)
@@ -46,7 +53,7 @@ class QosWatch:
             topic,
             qos,
             qos_overriding_options=overridable(),
-            event_callbacks=PublisherEventCallbacks(incompatible_qos=mismatch),
+            event_callbacks=PublisherEventCallbacks(incompatible_qos=mismatch, matched=matched),
         )
 
     def create_subscription(

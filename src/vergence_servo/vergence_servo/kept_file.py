@@ -5,7 +5,7 @@ import shutil
 import time
 from pathlib import Path
 
-from vergence_servo.last_pose import write_atomically
+from vergence_rig.atomic_file import write_atomically
 
 
 def difference(path: Path, text: str) -> str:

@@ -9,6 +9,7 @@ from typing import BinaryIO
 
 from vergence_camera.errors import TruncatedFileError, UnsupportedError
 
+_CHUNK = struct.Struct("<4sI")
 _MJPEG_CODES = {b"MJPG", b"mjpg", b"JPEG", b"jpeg", b"AVRn", b"dmb1"}
 
 
@@ -74,19 +75,19 @@ def frames(file: BinaryIO | FileIO, header: AviHeader, name: str) -> Iterator[by
         TruncatedFileError: the file ends in the middle of a frame, after all whole ones were yielded.
     """
     size = _size_of(file)
-    prefix = b"%02d" % header.stream
+    wanted = (b"%02ddc" % header.stream, b"%02ddb" % header.stream)
     position = 0
     while position + 12 <= size:
         if _read_at(file, position, 4) != b"RIFF":
             return
         end = position + 8 + struct.unpack("<I", _read_at(file, position + 4, 4))[0]
         for tag, begin, length in _walk(file, position + 12, min(end, size), enter=(b"movi", b"rec ")):
-            if tag[:2] != prefix or tag[2:] not in (b"dc", b"db"):
+            if tag not in wanted:
                 continue
             if begin + length > size:
                 raise TruncatedFileError(f"{name}: the file ends {begin + length - size} bytes before its last frame")
             if length:
-                yield _read_at(file, begin, length)
+                yield file.read(length)
         if end > size:
             raise TruncatedFileError(f"{name}: the file has {size} bytes, its header says {end}")
         position = end + (end & 1)
@@ -95,18 +96,20 @@ def frames(file: BinaryIO | FileIO, header: AviHeader, name: str) -> Iterator[by
 def _walk(
     file: BinaryIO | FileIO, position: int, end: int, enter: tuple[bytes, ...]
 ) -> Iterator[tuple[bytes, int, int]]:
-    """Yield tag, begin and length of each chunk; lists whose type is in `enter` are yielded (by type) and entered."""
+    """Yield tag, begin and length of each chunk, with the file standing at its begin.
+
+    A list is yielded by its type; those in `enter` are then entered, which is no more than to step over their head.
+    """
     while position + 8 <= end:
-        tag, length = struct.unpack("<4sI", _read_at(file, position, 8))
+        file.seek(position)
+        tag, length = _CHUNK.unpack(file.read(8))
         begin = position + 8
-        if tag == b"LIST":
-            kind = _read_at(file, begin, 4)
-            yield kind, begin + 4, max(0, length - 4)
-            if kind in enter:
-                yield from _walk(file, begin + 4, min(begin + length, end), enter)
-        else:
-            yield tag, begin, length
         position = begin + length + (length & 1)
+        if tag == b"LIST":
+            tag, begin, length = file.read(4), begin + 4, max(0, length - 4)
+            if tag in enter:
+                position = begin
+        yield tag, begin, length
 
 
 def _read_at(file: BinaryIO | FileIO, position: int, length: int) -> bytes:

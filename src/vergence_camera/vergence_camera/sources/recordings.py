@@ -39,8 +39,7 @@ class AviRecording:
         """See Recording."""
         with self._path.open("rb", buffering=0) as file:  # the demuxer asks for what it needs and no more
             header = read_header(file, self.identity)
-            for data in frames(file, header, self.identity):
-                yield Picture(data)
+            yield from frames(file, header, self.identity)
 
 
 class VideoRecording:
@@ -72,7 +71,7 @@ class VideoRecording:
                 if not done:
                     break
                 given += 1
-                yield Picture(np.asarray(pixels, dtype=np.uint8))
+                yield np.asarray(pixels, dtype=np.uint8)
         finally:
             capture.release()
         # Containers round their durations: a frame or two short is no damage.
@@ -100,7 +99,7 @@ class FolderRecording:
 
     def mode(self) -> Mode:
         """See Recording."""
-        first = self._load(self._files()[0]).data
+        first = self._load(self._files()[0])
         if isinstance(first, bytes):
             info = inspect_jpeg(first)
             return Mode("MJPG", info.width_px, info.height_px, 0.0)
@@ -121,11 +120,11 @@ class FolderRecording:
     def _load(self, file: Path) -> Picture:
         data = file.read_bytes()
         if file.suffix.lower() in _JPEG_SUFFIXES:
-            return Picture(data)
+            return data
         pixels: Pixels | None = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYCOLOR) if data else None
         if pixels is None:
             raise CorruptFrameError(f"{file}: cannot be decoded")
-        return Picture(pixels)
+        return pixels
 
 
 def open_recording(path: Path) -> Recording:

@@ -3,20 +3,15 @@
 import contextlib
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from vergence_camera.errors import CorruptFrameError, ReplayEndedError, TruncatedFileError
 from vergence_camera.frame import Clock, Encoding, Frame, Mode, ModeRequest, Pixels
 from vergence_camera.jpeg import inspect_jpeg
 from vergence_camera.sources.asked_mode import check_asked, size_alone
 
-
-@dataclass(frozen=True)
-class Picture:
-    """One recorded picture: JPEG bytes as they lie in the file, or decoded pixels (BGR or grey)."""
-
-    data: bytes | Pixels
+# One recorded picture: JPEG bytes as they lie in the file, or decoded pixels (BGR or grey).
+Picture: TypeAlias = bytes | Pixels
 
 
 class Recording(Protocol):
@@ -61,7 +56,7 @@ class Replay:
         self._sleep, self._now_ns = sleep, now_ns
         self._pictures: Iterator[Picture] | None = None
         self._mode = Mode("", 0, 0, 0.0)
-        self._sequence = self._due_ns = self._in_this_round = 0
+        self._sequence = self._due_ns = self._period_ns = self._in_this_round = 0
 
     @property
     def identity(self) -> str:
@@ -76,21 +71,22 @@ class Replay:
         self._mode = Mode(found.pixel_format, found.width_px, found.height_px, rate)
         check_asked(size_alone(self._request), self._mode, self.identity, "recording")
         self._pictures = self._recording.pictures()
-        self._due_ns = self._now_ns()
+        self._due_ns, self._period_ns = self._now_ns(), round(1e9 / rate)
         return self._mode
 
     def read(self, timeout_s: float) -> Frame | None:
         """See FrameSource; ReplayEndedError after the last frame if it is to be played once."""
-        wait_ns = self._due_ns - self._now_ns()
+        due_ns = self._due_ns
+        wait_ns = due_ns - self._now_ns()
         if wait_ns > timeout_s * 1e9:
             self._sleep(timeout_s)
             return None
         if wait_ns > 0:
-            self._sleep(wait_ns / 1e9)
-        due_ns = self._due_ns
-        if self._now_ns() - due_ns > self._catch_up_ns:
-            due_ns = self._now_ns()
-        self._due_ns = due_ns + round(1e9 / self._mode.rate_hz)
+            self._sleep(wait_ns * 1e-9)
+        now_ns = self._now_ns()
+        if now_ns - due_ns > self._catch_up_ns:
+            due_ns = now_ns
+        self._due_ns = due_ns + self._period_ns
         picture = self._next()
         sequence, self._sequence = self._sequence, self._sequence + 1
         return self._frame(picture, due_ns, sequence)
@@ -124,15 +120,14 @@ class Replay:
             raise ReplayEndedError(f"{self.identity}: has no picture in it")
 
     def _frame(self, picture: Picture, time_ns: int, sequence: int) -> Frame:
-        data = picture.data
-        if isinstance(data, bytes):
-            info = inspect_jpeg(data)
+        if isinstance(picture, bytes):
+            info = inspect_jpeg(picture)
             width, height, encoding = info.width_px, info.height_px, Encoding.JPEG
         else:
-            height, width = data.shape[:2]
-            encoding = Encoding.GREY if data.ndim == 2 else Encoding.BGR
-        if (width, height) != (self._mode.width_px, self._mode.height_px):
+            height, width = picture.shape[:2]
+            encoding = Encoding.GREY if picture.ndim == 2 else Encoding.BGR
+        if width != self._mode.width_px or height != self._mode.height_px:
             raise CorruptFrameError(
                 f"{self.identity}: picture {sequence} is {width}x{height}, the recording began as {self._mode}"
             )
-        return Frame(data, encoding, width, height, time_ns, Clock.MONOTONIC, sequence)
+        return Frame(picture, encoding, width, height, time_ns, Clock.MONOTONIC, sequence)
