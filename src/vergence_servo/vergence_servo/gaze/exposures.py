@@ -35,8 +35,7 @@ class Exposures:
         if not self._history.covers(stamp_s):
             return False
         first, last = min(stamp_s, stamp_s + skew_s), max(stamp_s, stamp_s + skew_s)
-        first -= self._p.settle_s
-        if self._history.speed_within(first, last) < self._p.still_speed_rad_s:
+        if self._history.speed_within(first - self._p.settle_s, last) < self._p.still_speed_rad_s:
             return True
         if target is None or not target.moving:
             return False

@@ -182,5 +182,18 @@ class Perception:
         along = float(np.abs(estimate.rates_rad_s).max()) if estimate.moving else 0.0
         sweeping = self.history.speed_within(stamp_s - 0.03, stamp_s) > along + _SWEEPING_RAD_S
         certain = float(estimate.sigmas_rad[1]) < _STEADY_VERGENCE_RAD
-        steady = certain and not sweeping and not self.tracking.doubtful
+        present = self._present_error_rad(now_s)
+        # What passed over the target when the pair was exposed is elsewhere by now.
+        there = present <= min(self._p.verged_enter_rad + self._unresolved_rad, self._p.verged_leave_rad)
+        steady = certain and there and not sweeping and not self.tracking.doubtful
         self.judge.see_pair(stamp_s, now_s, error, steady, verging)
+
+    def _present_error_rad(self, now_s: float) -> float:
+        """Return how far the eyes, as they stand by now, are from the target as it is predicted."""
+        estimate, joints = self.tracking.estimate(now_s), self.history.shaft_rad
+        if estimate is None:
+            return math.inf
+        off = np.abs(estimate.joints_rad - joints)
+        judged = self._driven if self._driven[:2].all() else self._driven & np.array([False, False, True])
+        vergence = abs(estimate.vergence_rad - float(joints[1] - joints[0]))
+        return max(vergence, float(off[judged].max(initial=0.0)))

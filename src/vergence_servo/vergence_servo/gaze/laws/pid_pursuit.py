@@ -14,6 +14,7 @@ import numpy.typing as npt
 from vergence_rig.rig import Rig
 from vergence_servo.gaze.laws.protocol import LawView, target_residual
 from vergence_servo.gaze.parameters import GazeParameters
+from vergence_servo.gaze.servo_inverse import ServoInverse
 
 Array = npt.NDArray[np.float64]
 
@@ -27,6 +28,7 @@ _PLAY_SHARE = 0.25
 _SLOW_RAD_S = 0.03
 _FADE_S = 0.4
 _STALE_S = 0.3
+_FARTHEST_RAD = 0.06
 
 
 class PidPursuitLaw:
@@ -36,12 +38,15 @@ class PidPursuitLaw:
     unsigned = False
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
+        self._inverse = ServoInverse(rig, parameters.hold_tolerance_rad, parameters.dead_band_trust)
         plays = [joint.servo.dead_band_rad + joint.servo.backlash_rad for _, joint in rig.joints.items()]
         self._at_rest_rad = parameters.hold_tolerance_rad + _PLAY_SHARE * max(plays)
         self.reset()
 
     def reset(self) -> None:
         """Forget the speed and where the target was."""
+        self._inverse.reset()
+        self._aim = np.full(3, np.nan)
         self._speed = np.zeros(3)
         self._place = np.full(3, np.nan)
         self._errors = self._slope = np.zeros(3)
@@ -63,7 +68,13 @@ class PidPursuitLaw:
             self._speed = np.where(resting, 0.0, self._speed)
         rates = _PROPORTIONAL * errors + self._speed + _DERIVATIVE * np.where(errors != 0.0, self._slope, 0.0)
         version, vergence, tilt = rates * view.elapsed_s
-        return view.turned(version, vergence, tilt)
+        return self._past_the_play(view, view.turned(version, vergence, tilt) - view.commanded_rad)
+
+    def _past_the_play(self, view: LawView, turn: Array) -> Array:
+        """Return the command (3,) that turns the shafts by `turn` (3,): waiting for the play, the law would wind up."""
+        before = np.where(np.isfinite(self._aim), self._aim, view.shaft_rad)
+        self._aim = np.clip(before + turn, view.shaft_rad - _FARTHEST_RAD, view.shaft_rad + _FARTHEST_RAD)
+        return self._inverse.command(self._aim, view.shaft_rad, view.commanded_rad)
 
     def residual(self, view: LawView) -> Array:
         """Return next to nothing: pursuit is smooth whatever the error, there is nothing to saccade for."""
