@@ -9,7 +9,7 @@ from collections import deque
 
 _SAME_PAIR_S = 0.012
 _FRESH_S = 0.5
-_ENOUGH_PAIRS = 10
+_ENOUGH_PAIRS, _ENOUGH_PAIRS_MOVING, _MOST_PAIRS = 10, 24, 30
 _SILENT_S = 0.3
 _MEMORY = 0.7
 _SMOOTHED = math.sqrt((1.0 - _MEMORY) / (1.0 + _MEMORY))
@@ -33,10 +33,12 @@ class Agreement:
         self._fovea_off, self._track_off = _Mean(), _Mean()
         self._differing = 0
 
-    @property
-    def disagreement(self) -> bool:
-        """True while two estimators differ by more than the object's own depth explains, and no box decides."""
-        return self._differing >= _ENOUGH_PAIRS and self._both_speak
+    def disagreement(self, moving: bool) -> bool:
+        """True while two estimators differ by more than the object's own depth explains, and no box decides.
+
+        Of a moving target it takes longer: it passes before others, and eyes that hold still would lose it.
+        """
+        return self._differing >= (_ENOUGH_PAIRS_MOVING if moving else _ENOUGH_PAIRS) and self._both_speak
 
     @property
     def doubtful(self) -> bool:
@@ -74,7 +76,7 @@ class Agreement:
         elif self._boxes_are_fresh(stamp_s) and self.fovea_is_astray(stamp_s) != self.track_is_astray(stamp_s):
             self._differing = 0
         else:
-            self._differing = min(self._differing + 1, 2 * _ENOUGH_PAIRS)
+            self._differing = min(self._differing + 1, _MOST_PAIRS)
 
     def see_box(self, stamp_s: float, vergence_rad: float, sigma_rad: float, own_depth_rad: float) -> None:
         """Take the boxes' vergence of a pair; boxes are slow, so that the others' of that pair are known by then."""

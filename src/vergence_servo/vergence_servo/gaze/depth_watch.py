@@ -9,22 +9,25 @@ from vergence_servo.gaze.target_filter import TargetEstimate
 _LONG_S = 0.8
 _CONFIRMED_S = 0.1
 _SAME_PAIR_S = 0.012
+_DOUBTS = 2.0
+_TOLERANCE_RAD = 0.01
 
 
 class DepthWatch:
-    """Notices when a track's vergence leaves what is known of the target, and for how long it stays there.
+    """Notices when a track's vergence leaves what is known of the target, and for how long it stays there."""
 
-    `tolerance_rad` is how far it may be off; only an estimate surer than `sure_rad` is held against it.
-    """
-
-    def __init__(self, tolerance_rad: float, sure_rad: float) -> None:
-        self._tolerance_rad, self._sure_rad = tolerance_rad, sure_rad
+    def __init__(self) -> None:
         self.clear()
 
     def clear(self) -> None:
         """Nothing has been seen."""
         self._off_since_s = math.nan
         self._fovea: deque[tuple[float, float]] = deque(maxlen=30)
+
+    @property
+    def doubts_the_track(self) -> bool:
+        """True while the track's depth is off what is known of the target."""
+        return math.isfinite(self._off_since_s)
 
     def see_fovea(self, stamp_s: float, vergence_rad: float) -> None:
         """Take the vergence of what lies at the fovea."""
@@ -35,9 +38,8 @@ class DepthWatch:
 
         What moved a moment ago may pass before something; of what rested, the fovea may confirm the new depth.
         """
-        if not estimate.sigmas_rad[1] < self._sure_rad:
-            return False
-        if abs(vergence_rad - estimate.vergence_rad) <= self._tolerance_rad + own_depth_rad:
+        doubt_rad = _DOUBTS * float(estimate.sigmas_rad[1])
+        if abs(vergence_rad - estimate.vergence_rad) <= _TOLERANCE_RAD + own_depth_rad + doubt_rad:
             self._off_since_s = math.nan
             return False
         if math.isnan(self._off_since_s):

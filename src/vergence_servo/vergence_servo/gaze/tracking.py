@@ -52,7 +52,7 @@ class TargetTracking:
         )
         self._exposures = Exposures(parameters, history)
         self._agreement = Agreement(parameters.disagreement_rad)
-        self._depths = DepthWatch(parameters.disagreement_rad, parameters.verged_enter_rad)
+        self._depths = DepthWatch()
         self._rivals = Rivals(parameters.distractor_patience_s)
         self.clear()
 
@@ -94,7 +94,7 @@ class TargetTracking:
     @property
     def disagreement(self) -> bool:
         """True while two estimators differ by more than the object's own depth explains."""
-        return self._agreement.disagreement
+        return self._agreement.disagreement(self.filter.moving)
 
     @property
     def doubtful(self) -> bool:
@@ -157,7 +157,7 @@ class TargetTracking:
         self._agreement.see_fovea(stamp_s, vergence)
         self._depths.see_fovea(stamp_s, vergence)
         self._rivals.see_fovea(stamp_s, vergence, joints)
-        if self._agreement.track_is_fresh(stamp_s, _FRESH_S):
+        if self._agreement.track_is_fresh(stamp_s, _FRESH_S) and not self._depths.doubts_the_track:
             return False  # the tracker measures the target itself; the fovea only whatever lies there
         if not self._agreement.fovea_may_be_the_target(stamp_s, vergence):
             self.note = "the fovea looks past the target that the boxes show"
