@@ -16,6 +16,7 @@ _TIMING_SIGMA_S = 0.006
 _CATCHING_UP_RAD_S = 2.0
 """How fast the eyes may slip off a moving target: who must catch up cannot wait for a still image."""
 _REPORT_S = 0.02
+_SIGMA_BOUNDS_RAD = (1e-5, 0.5)
 _LARGEST_SKEW_S = 0.1
 
 
@@ -42,10 +43,10 @@ class Exposures:
         return self._history.speed_within(first, last, target.joint_rates_rad_s) < _CATCHING_UP_RAD_S
 
     def sigma(self, stamp_s: float, skew_s: float, sigma_rad: float) -> float:
-        """Add what a few milliseconds of doubt about the stamps mean while the eyes move."""
+        """Return a sighting's standard deviation with what a few milliseconds of doubt mean while the eyes move."""
         first, last = min(stamp_s, stamp_s + skew_s), max(stamp_s, stamp_s + skew_s)
         speed = self._history.speed_within(first - _REPORT_S, last + 0.001)
-        return math.hypot(sigma_rad, _TIMING_SIGMA_S * speed)
+        return math.hypot(positive_sigma(sigma_rad, self._p.direction_sigma_rad), _TIMING_SIGMA_S * speed)
 
     def at_fovea(self, stamp_s: float, target: TargetEstimate | None) -> bool:
         """Tell whether the target was at the left fovea."""
@@ -53,3 +54,10 @@ class Exposures:
             return False
         joints, wanted = self._history.shaft_at(stamp_s), target.joints_rad
         return math.hypot(wanted[0] - joints[0], wanted[2] - joints[2]) <= self._p.fovea_radius_rad
+
+
+def positive_sigma(sigma_rad: float, fallback_rad: float) -> float:
+    """Return a standard deviation that somebody stated, held to what is sensible; `fallback_rad` if it is none."""
+    if not (math.isfinite(sigma_rad) and sigma_rad > 0):
+        return fallback_rad
+    return min(max(sigma_rad, _SIGMA_BOUNDS_RAD[0]), _SIGMA_BOUNDS_RAD[1])

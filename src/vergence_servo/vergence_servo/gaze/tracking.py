@@ -7,7 +7,6 @@ fovea differ, the boxes' depth is the target's.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,40 +15,29 @@ import numpy.typing as npt
 from vergence_rig.rig import Rig
 from vergence_servo.gaze import directions
 from vergence_servo.gaze.agreement import Agreement
+from vergence_servo.gaze.believed_target import BelievedTarget
 from vergence_servo.gaze.depth_watch import DepthWatch
 from vergence_servo.gaze.directions import SightingError
-from vergence_servo.gaze.exposures import Exposures
+from vergence_servo.gaze.exposures import Exposures, positive_sigma
 from vergence_servo.gaze.joint_history import JointHistory
 from vergence_servo.gaze.joint_moves import JointMoves
-from vergence_servo.gaze.kalman import Measurement
-from vergence_servo.gaze.laws.protocol import VisualError
 from vergence_servo.gaze.locks import BoxLock, TrackLock
 from vergence_servo.gaze.observations import BoxSighting, FoveaDisparity, PointSighting, TrackSighting
 from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.rivals import SAME_DEPTH_RAD, Rivals
-from vergence_servo.gaze.target_filter import TargetEstimate, TargetFilter
 
 Array = npt.NDArray[np.float64]
 
 _FRESH_S = 0.15
 _BOX_LATE_S = 0.4
-_SIGMA_BOUNDS_RAD = (1e-5, 0.5)
 
 
-class TargetTracking:
-    """Holds the filter and decides what goes into it."""
+class TargetTracking(BelievedTarget):
+    """Decides what is believed of the target."""
 
     def __init__(self, rig: Rig, parameters: GazeParameters, history: JointHistory, moves: JointMoves) -> None:
-        self._p = parameters
-        self._history, self._moves = history, moves
+        super().__init__(parameters, history, moves)
         self._baseline_m = rig.baseline_m
-        self.filter = TargetFilter(
-            parameters.follow_acceleration_rad_s2,
-            parameters.manoeuvre_acceleration_rad_s2,
-            parameters.still_drift_rad_sqrt_s,
-            parameters.gate_sigma,
-            parameters.jump_count,
-        )
         self._exposures = Exposures(parameters, history)
         self._agreement = Agreement(parameters.disagreement_rad)
         self._depths = DepthWatch()
@@ -58,18 +46,14 @@ class TargetTracking:
 
     def clear(self) -> None:
         """No target is wanted."""
-        self.filter.forget()
+        self.forget()
         self.class_name: str | None = None
         self.takes_stream = False
-        self.visual: VisualError | None = None
-        self.seen_s = math.nan
-        self.source = ""
-        self.note = ""
         self._track, self._boxes = TrackLock(), BoxLock()
         self._agreement.clear()
         self._depths.clear()
         self._rivals.clear()
-        self._wanted_since_s = self._target_seen_s = -math.inf
+        self._wanted_since_s = -math.inf
         self._fovea_was_astray = False
 
     def want(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
@@ -101,23 +85,14 @@ class TargetTracking:
         """True if estimators have just differed, though not for long enough to call it a disagreement."""
         return self._agreement.doubtful
 
-    def estimate(self, time_s: float) -> TargetEstimate | None:
-        """Return the target at `time_s`, or None if there is none."""
-        return self.filter.at(time_s) if self.filter.initialised else None
-
-    def joint_rates_rad_s(self, time_s: float) -> Array:
-        """Return how fast each joint (3,) turns while it follows the target; 0 while none moves."""
-        estimate = self.estimate(time_s)
-        return estimate.joint_rates_rad_s if estimate is not None and estimate.moving else np.zeros(3)
-
     def see_track(self, sighting: TrackSighting, now_s: float) -> bool:
         """Take a track; True if it was the target's and was believed."""
         if not sighting.usable or not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
         sigma = self._exposures.sigma(sighting.stamp_s, sighting.skew_s, self._p.direction_sigma_rad)
-        disparity_sigma = _positive(sighting.sigma_rad, self._p.direction_sigma_rad)
+        disparity_sigma = positive_sigma(sighting.sigma_rad, self._p.direction_sigma_rad)
         measurement, seen = directions.track(self._history, sighting, sigma, disparity_sigma)
-        self._heed_moves(sighting.stamp_s)
+        self.heed_moves(sighting.stamp_s)
         if not self._is_wanted_track(sighting, seen):
             return False
         if math.isfinite(seen[1]):
@@ -131,7 +106,7 @@ class TargetTracking:
                 measurement, seen = directions.track(self._history, there, sigma, disparity_sigma)
         pan, tilt = self._track.offset
         measurement, seen = directions.shifted(measurement, pan, tilt), seen + np.array([pan, pan, tilt])
-        return self._believe(measurement, seen, sighting.skew_s, now_s, "track")
+        return self.believe(measurement, seen, sighting.skew_s, now_s, "track")
 
     def see_fovea(self, sighting: FoveaDisparity, now_s: float) -> bool:
         """Take the disparity at the left fovea; True if it was the target's and was believed."""
@@ -143,9 +118,7 @@ class TargetTracking:
             stamp_s, self.estimate(stamp_s)
         ):
             return False
-        sigma = self._exposures.sigma(
-            stamp_s, sighting.skew_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad)
-        )
+        sigma = self._exposures.sigma(stamp_s, sighting.skew_s, sighting.sigma_rad)
         measurement = directions.fovea_vergence(self._history, stamp_s, sighting.skew_s, sighting.horizontal_rad, sigma)
         # Between the two exposures the target has moved on before the right eye.
         measurement = replace(
@@ -153,7 +126,7 @@ class TargetTracking:
         )
         vergence = float(measurement.values[0])
         joints = self._history.shaft_at(stamp_s)
-        self._heed_moves(stamp_s)
+        self.heed_moves(stamp_s)
         self._agreement.see_fovea(stamp_s, vergence)
         self._depths.see_fovea(stamp_s, vergence)
         self._rivals.see_fovea(stamp_s, vergence, joints)
@@ -167,7 +140,7 @@ class TargetTracking:
         if established and not self._still_at_its_depth(vergence, sigma, stamp_s, now_s):
             self.note = "something at another depth lies at the fovea"
             return False
-        return self._believe(measurement, seen, sighting.skew_s, now_s, "fovea", may_jump=lambda: not established)
+        return self.believe(measurement, seen, sighting.skew_s, now_s, "fovea", may_jump=lambda: not established)
 
     def _still_at_its_depth(self, vergence_rad: float, sigma_rad: float, stamp_s: float, now_s: float) -> bool:
         """Tell whether the fovea's vergence may be that of a target that was itself seen: not if something hides it."""
@@ -175,7 +148,7 @@ class TargetTracking:
         if estimate is None:
             return False
         bound_rad = SAME_DEPTH_RAD
-        if now_s - self._target_seen_s < _FRESH_S:
+        if now_s - self.target_itself_seen_s < _FRESH_S:
             bound_rad += 2.0 * (sigma_rad + float(estimate.sigmas_rad[1]))
         return abs(vergence_rad - estimate.vergence_rad) < bound_rad
 
@@ -188,11 +161,9 @@ class TargetTracking:
             return False
         if not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
-        sigma = self._exposures.sigma(
-            sighting.stamp_s, sighting.skew_s, _positive(sighting.sigma_rad, self._p.direction_sigma_rad)
-        )
+        sigma = self._exposures.sigma(sighting.stamp_s, sighting.skew_s, sighting.sigma_rad)
         measurement, seen = directions.box(self._history, sighting, sigma)
-        self._heed_moves(sighting.stamp_s)
+        self.heed_moves(sighting.stamp_s)
         vergence = float(seen[1] - seen[0])
         own_depth = _own_depth(vergence, sighting.extent_rad)
         if not by_class:
@@ -201,7 +172,7 @@ class TargetTracking:
             pan, tilt = (float(angle) for angle in self._boxes.offset)
             measurement, seen = directions.shifted(measurement, pan, tilt), seen + np.array([pan, pan, tilt])
         elif not self.filter.initialised:
-            self._start_from(measurement)
+            self.start_from(measurement)
 
         def may_jump() -> bool:
             if not by_class:
@@ -209,7 +180,7 @@ class TargetTracking:
             expected = self.filter.at(sighting.stamp_s)
             return self._rivals.may_be_the_target(sighting.stamp_s, seen, sighting.extent_rad, own_depth, expected)
 
-        believed = self._believe(measurement, seen, sighting.skew_s, now_s, "box", may_jump)
+        believed = self.believe(measurement, seen, sighting.skew_s, now_s, "box", may_jump)
         if believed:
             self._rivals.found(sighting.stamp_s, self.filter.at(sighting.stamp_s))
         if believed or not by_class:
@@ -244,53 +215,13 @@ class TargetTracking:
         """Take a point of the stream; True if the stream is wanted and the point was believed."""
         if not self.takes_stream:
             return False
-        sigma = _positive(sighting.sigma_rad, self._p.point_sigma_rad)
+        sigma = positive_sigma(sighting.sigma_rad, self._p.point_sigma_rad)
         measurement = directions.point(self._history, sighting.stamp_s, sighting.point_m, self._baseline_m, sigma)
         if not self.filter.initialised:
-            self._start_from(measurement)
+            self.start_from(measurement)
         version, vergence, tilt = measurement.values
         seen = np.array([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
-        return self._believe(measurement, seen, 0.0, now_s, "point")
-
-    def _believe(
-        self,
-        measurement: Measurement,
-        seen_rad: Array,
-        skew_s: float,
-        now_s: float,
-        source: str,
-        may_jump: Callable[[], bool] = lambda: True,
-    ) -> bool:
-        self._heed_moves(measurement.stamp_s)
-        if not (self.filter.update(measurement) or (may_jump() and self.filter.jump(measurement))):
-            self.note = (
-                f"{source} differs from the prediction by {math.degrees(self.filter.last_innovation_rad):.1f} deg"
-            )
-            return False
-        if source == "fovea":
-            # It tells only the depth; where the target lies is what is known of it.
-            seen_rad = np.where(np.isnan(seen_rad), self.filter.at(measurement.stamp_s).joints_rad, seen_rad)
-        at_left = self._history.shaft_at(measurement.stamp_s)
-        at_right = self._history.shaft_at(measurement.stamp_s + skew_s)
-        error_rad = seen_rad - np.array([at_left[0], at_right[1], at_left[2]])
-        self.visual = VisualError(measurement.stamp_s, seen_rad, error_rad)
-        self.seen_s, self.source, self.note = now_s, source, ""
-        if source != "fovea":
-            self._target_seen_s = now_s
-        return True
-
-    def _heed_moves(self, stamp_s: float) -> None:
-        """Let the filter know what the joints' moves before an exposure have made of what it knew."""
-        for variances in self._moves.take_before(stamp_s):
-            self.filter.loosen(variances)
-
-    def _start_from(self, measurement: Measurement) -> None:
-        """Begin the filter at a first sighting, with the vergence that is assumed while only one eye sees."""
-        wide = math.radians(60.0)
-        joints = self._history.shaft_at(measurement.stamp_s)
-        angles = np.array([0.5 * (joints[0] + joints[1]), self._p.prior_vergence_rad, joints[2]])
-        sigma = wide if len(measurement.values) > 2 else self._p.prior_vergence_sigma_rad
-        self.filter.start(measurement.stamp_s, angles, np.diag(np.square([wide, sigma, wide])))
+        return self.believe(measurement, seen, 0.0, now_s, "point")
 
     def eyes_were_still(self, stamp_s: float, skew_s: float) -> bool:
         """Tell whether the eyes turned slowly enough, and for long enough before, for a pair to be used."""
@@ -310,12 +241,6 @@ class TargetTracking:
         )
         self.note = why_not or self.note
         return not why_not
-
-
-def _positive(sigma_rad: float, fallback_rad: float) -> float:
-    if not (math.isfinite(sigma_rad) and sigma_rad > 0):
-        return fallback_rad
-    return min(max(sigma_rad, _SIGMA_BOUNDS_RAD[0]), _SIGMA_BOUNDS_RAD[1])
 
 
 def _own_depth(vergence_rad: float, extent_rad: float) -> float:
