@@ -23,13 +23,13 @@ class Motion:
 
     def __init__(self, calm_rad_s2: float, manoeuvre_rad_s2: float) -> None:
         self.modes = (Kalman(calm_rad_s2, 0.0), Kalman(max(calm_rad_s2, manoeuvre_rad_s2), 0.0))
-        self.weights = np.array([1.0, 0.0])
+        self.weights = _sensible(np.array([1.0, 0.0]))
 
     def start(self, state: Array, covariance: Array, weights: tuple[float, float] = (1.0, 0.0)) -> None:
         """Begin both models at a state (6,) with its covariance (6, 6)."""
         for mode in self.modes:
             mode.state, mode.covariance = state.copy(), covariance.copy()
-        self.weights = np.array(weights)
+        self.weights = _sensible(np.array(weights))
 
     def mixed(self) -> tuple[Array, Array]:
         """Return mean (6,) and covariance (6, 6) of both together."""
@@ -39,14 +39,15 @@ class Motion:
         """Predict `duration_s` ahead: the longer, the likelier that the target has begun or ended a manoeuvre."""
         begins, ends = 1.0 - math.exp(-duration_s / _CALM_FOR_S), 1.0 - math.exp(-duration_s / _MANOEUVRES_FOR_S)
         switch = np.array([[1.0 - begins, begins], [ends, 1.0 - ends]])
-        weights = self.weights @ switch
         # Column j: from where a target that is now in mode j came.
-        origins = switch * self.weights[:, None] / weights
+        origins = switch * self.weights[:, None]
+        weights = origins.sum(axis=0)
+        origins = origins / weights
         starts = [self._moments(origins[:, j]) for j in range(2)]
         for mode, (state, covariance) in zip(self.modes, starts, strict=True):
             mode.state, mode.covariance = state, covariance
             mode.advance(duration_s)
-        self.weights = weights
+        self.weights = _sensible(weights)
 
     def fits(self, measurement: Measurement, now_s: float) -> tuple[Fit, Fit]:
         """Hold a measurement against both models."""
@@ -65,8 +66,7 @@ class Motion:
         weights = self.weights * np.exp(losses.min() - losses)
         for mode, fit in zip(self.modes, fits, strict=True):
             mode.correct(fit, sigmas)
-        weights = np.maximum(weights / max(float(weights.sum()), 1e-300), _LEAST_WEIGHT)
-        self.weights = weights / weights.sum()
+        self.weights = _sensible(weights / max(float(weights.sum()), 1e-300))
 
     def _moments(self, weights: Array) -> tuple[Array, Array]:
         one, other = self.modes
@@ -74,3 +74,10 @@ class Motion:
         state = weights[0] * one.state + weights[1] * other.state
         covariance = weights[0] * one.covariance + weights[1] * other.covariance
         return state, covariance + weights[0] * weights[1] * np.outer(apart, apart)
+
+
+def _sensible(weights: Array) -> Array:
+    """Return weights (2,) that sum to one, none of them nothing: the other model may be right any time."""
+    held = np.maximum(weights, _LEAST_WEIGHT)
+    shares: Array = held / held.sum()
+    return shares
