@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tools.train_detector.augmentation import Strength, part_of
-from tools.train_detector.average_precision import ImageResult, average_precision, mean_average_precision
+from tools.train_detector.augmentation import Strength, closer_look, part_of
+from tools.train_detector.average_precision import ImageResult, average_precision, iou_matrix, mean_average_precision
 from tools.train_detector.evaluation import Scores
+from tools.train_detector.head_views import head_views
 from tools.train_detector.labels import label
 from tools.train_detector.look_alikes import KINDS, SMALLEST_PX, faces
+from vergence_metric.box_parameters import DetectorParameters
+from vergence_metric.boxes import Detector
 
 FOCAL_PX = 500.0
 SHAPE = (480, 640)
@@ -132,3 +135,55 @@ def test_every_look_alike_has_six_faces_and_a_size(kind: str) -> None:
     assert len(made) == 6
     assert all(face.dtype == np.uint8 and face.std() >= 1 for face in made)
     assert SMALLEST_PX[kind] >= 6.5
+
+
+class TestCloserLook:
+    @pytest.mark.parametrize("seed", range(40))
+    def test_boxes_follow_the_picture(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        image = np.full((*SHAPE, 3), 40, np.uint8)
+        low = rng.uniform((20, 20), (420, 260))
+        box = np.rint(np.concatenate([low, low + rng.uniform(16, 140, 2)])).astype(np.float32)
+        image[int(box[1]) : int(box[3]), int(box[0]) : int(box[2])] = 255
+        alikes = np.array([[500, 380, 560, 440]], np.float32)
+        picture, found = closer_look(rng, image, box[None], alikes, (96, 96), PLAIN)
+        assert picture.shape == (96, 96, 3)
+        bright = picture[..., 0] > 147
+        if not len(found):
+            assert bright.mean() < 0.6
+            return
+        rows, columns = np.flatnonzero(bright.any(1)), np.flatnonzero(bright.any(0))
+        seen = [columns[0], rows[0], columns[-1] + 1, rows[-1] + 1]
+        np.testing.assert_allclose(found[0], seen, atol=1.5)
+
+    def test_objects_and_look_alikes_are_looked_at_alike_often(self) -> None:
+        rng, image = np.random.default_rng(0), np.zeros((*SHAPE, 3), np.uint8)
+        box, alike = np.array([[40, 40, 100, 100]], np.float32), np.array([[400, 300, 460, 360]], np.float32)
+        looks = [closer_look(rng, image, box, alike, (96, 96), PLAIN)[1] for _ in range(400)]
+        assert 0.4 < np.mean([len(found) > 0 for found in looks]) < 0.6
+
+    def test_an_empty_render_can_be_looked_at(self) -> None:
+        nothing = np.empty((0, 4), np.float32)
+        rng, image = np.random.default_rng(0), np.zeros((*SHAPE, 3), np.uint8)
+        picture, found = closer_look(rng, image, nothing, nothing, (96, 96), Strength())
+        assert picture.shape == (96, 96, 3)
+        assert not len(found)
+
+
+def test_head_views_hold_the_cube_where_their_boxes_say() -> None:
+    views = list(head_views(39_999, 6))
+    assert len(views) == 6
+    detector = Detector(DetectorParameters(threshold=0.3))
+    overlaps = [
+        iou_matrix(detector.detect(view.image).xyxy_px, view.boxes_px).max(initial=0.0)
+        for view in views
+        if len(view.boxes_px)
+    ]
+    assert len(overlaps) >= 3
+    assert np.median(overlaps) > 0.8
+
+
+def test_head_views_are_their_seeds() -> None:
+    for first, second in zip(head_views(39_999, 2), head_views(39_999, 2), strict=True):
+        np.testing.assert_array_equal(first.image, second.image)
+        np.testing.assert_array_equal(first.boxes_px, second.boxes_px)

@@ -8,7 +8,7 @@ import cv2
 import torch
 
 from tools.train_detector.card import write_figures
-from tools.train_detector.dataset import HELD_OUT, TRAINING, load, make
+from tools.train_detector.dataset import HELD_OUT, TRAINING, load, make, render_head_world, render_world
 from tools.train_detector.evaluation import evaluate
 from tools.train_detector.export import add_words, export
 from tools.train_detector.network import Detector
@@ -16,6 +16,7 @@ from tools.train_detector.training import Schedule, train
 from vergence_metric.boxes.session import SHIPPED_MODEL
 
 TRAINING_SEEDS = 20_000
+HEAD_SEEDS = 30_000
 HELD_OUT_SEEDS = 900_000
 
 
@@ -25,8 +26,12 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/train_detector"), help="renders, state, figures")
     parser.add_argument("--worlds", type=int, default=200, help="rooms to render for training")
     parser.add_argument("--views", type=int, default=60, help="renders of each")
+    parser.add_argument("--head-worlds", type=int, default=120, help="rooms to render as the head sees its target")
+    parser.add_argument("--head-views", type=int, default=40, help="renders of each")
     parser.add_argument("--held-out", type=int, default=12, help="rooms to evaluate on")
-    parser.add_argument("--minutes", type=float, default=68.0, help="of training, wall time")
+    parser.add_argument("--minutes", type=float, default=120.0, help="of training, wall time")
+    parser.add_argument("--rate", type=float, default=3e-3, help="of learning, at its peak")
+    parser.add_argument("--start", type=Path, help="weights.pt of an earlier run, to go on from")
     parser.add_argument("--threads", type=int, default=1, help="of training")
     parser.add_argument("--model", type=Path, help="where the model goes; default: OUT/rubik_cube.onnx")
     parser.add_argument("--ship", action="store_true", help="put the model where the package has it")
@@ -41,12 +46,19 @@ def main() -> int:
     folder = options.out
     training = range(TRAINING_SEEDS, TRAINING_SEEDS + options.worlds)
     held_out = range(HELD_OUT_SEEDS, HELD_OUT_SEEDS + options.held_out)
-    make(folder / "data", training, options.views, TRAINING, say)
-    make(folder / "held_out", held_out, options.views, HELD_OUT, say)
+    head = range(HEAD_SEEDS, HEAD_SEEDS + options.head_worlds)
+    make(folder / "data", training, lambda seed: render_world(seed, options.views, TRAINING), say)
+    make(folder / "head", head, lambda seed: render_head_world(seed, options.head_views), say)
+    make(folder / "held_out", held_out, lambda seed: render_world(seed, options.views, HELD_OUT), say)
     detector = Detector(classes=1)
-    renders = load(sorted((folder / "data").glob("world_*.npz")))
+    if options.start is not None:
+        detector.load_state_dict(torch.load(options.start))
+    # What the head sees is shown twice as often.
+    shown = sorted((folder / "data").glob("world_*.npz")) + 2 * sorted((folder / "head").glob("world_*.npz"))
+    renders = load(shown)
     say(f"training on {len(renders.images)} renders for {options.minutes:g} min")
-    averaged = train(detector, lambda: renders, Schedule(options.minutes), folder, say)
+    averaged = train(detector, lambda: renders, Schedule(options.minutes, rate=options.rate), folder, say)
+    torch.save(averaged.state_dict(), folder / "weights.pt")
     path = SHIPPED_MODEL if options.ship else options.model or folder / "rubik_cube.onnx"
     path.parent.mkdir(parents=True, exist_ok=True)
     about = {"description": "Rubik's cube, trained on the simulator's renders", "license": "Apache-2.0"}

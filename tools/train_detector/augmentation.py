@@ -6,10 +6,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.boxes.second_look import Window
+
 Image = NDArray[np.uint8]
 Boxes = NDArray[np.float32]
 _SHIPPED_SCALE = 0.5
 _LEAST_SEEN, _LEAST_PX = 0.35, 5.0
+_ANYWHERE, _ANYWHERE_PX = 0.06, (12.0, 150.0)  # share of the second looks at nothing, and their boxes' sides
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ def part_of(
         rng: random numbers.
         image: (h, w, 3) BGR.
         boxes: (M, 4) of the objects, counted from the image's corner [px].
-        alikes: (K, 2) places of look-alikes [px].
+        alikes: (K, 4) of look-alikes [px].
         size_px: of the part, in the detector's pixels.
         strength: how far to vary it. Half of the parts have the scale at which the detector runs on whole images, the
             others anything from farther away to a second look at full resolution.
@@ -54,11 +57,55 @@ def part_of(
     )
     inside = inside[kept]
     if rng.random() < 0.5:
-        picture = picture[:, ::-1]
-        inside = np.stack([size_px[0] - inside[:, 2], inside[:, 1], size_px[0] - inside[:, 0], inside[:, 3]], axis=1)
+        picture, inside = picture[:, ::-1], _mirrored(inside, size_px[0])
     if strength.colour:
         picture = _relit(rng, picture)
     return np.ascontiguousarray(picture), inside
+
+
+def closer_look(
+    rng: np.random.Generator,
+    image: Image,
+    boxes: Boxes,
+    alikes: Boxes,
+    size_px: tuple[int, int],
+    strength: Strength,
+) -> tuple[Image, Boxes]:
+    """Return a varied second look at an object, look-alike or anything, as the node cuts it; see `part_of`.
+
+    The window stands about a box as wrong as a first look's may be.
+    """
+    choice = rng.random()
+    if choice < _ANYWHERE or not len(boxes) + len(alikes):
+        low, high = np.log(_ANYWHERE_PX)
+        middle, half = rng.uniform((0, 0), image.shape[1::-1]), 0.5 * np.exp(rng.uniform(low, high, 2))
+        box = np.concatenate([middle - half, middle + half])
+    else:
+        # As many look-alikes as objects: what a closer look is asked of is mostly one of the two.
+        among = boxes if not len(alikes) or (len(boxes) and choice < 0.5 * (1 + _ANYWHERE)) else alikes
+        box = among[rng.integers(len(among))].astype(np.float64)
+    size = box[2:] - box[:2]
+    box = box + rng.normal(0, 1.0, 4) * np.tile(0.04 * size + 0.7, 2)
+    middle, half = 0.5 * (box[:2] + box[2:]), 0.5 * np.maximum(box[2:] - box[:2], 4.0) * rng.uniform(0.9, 1.15)
+    box = np.concatenate([middle - half, middle + half])
+    window = Window.about(box - 0.5, (image.shape[1], image.shape[0]), size_px)
+    picture = window.of(image)
+    factor = 1.0 / window.scale
+    inside = (boxes - np.array([window.x, window.y] * 2)) * factor
+    inside = np.clip(inside, 0, [*size_px, *size_px]).astype(np.float32)
+    kept = (_share(inside / factor, boxes) >= _LEAST_SEEN) & (
+        (inside[:, 2:] - inside[:, :2]).min(1, initial=np.inf) >= _LEAST_PX
+    )
+    inside = inside[kept]
+    if rng.random() < 0.5:
+        picture, inside = picture[:, ::-1], _mirrored(inside, size_px[0])
+    if strength.colour:
+        picture = _relit(rng, picture)
+    return np.ascontiguousarray(picture), inside
+
+
+def _mirrored(boxes: Boxes, width: int) -> Boxes:
+    return np.stack([width - boxes[:, 2], boxes[:, 1], width - boxes[:, 0], boxes[:, 3]], axis=1)
 
 
 def _share(inside: Boxes, boxes: Boxes) -> Boxes:
@@ -77,7 +124,8 @@ def _corner(
             box = boxes[rng.integers(len(boxes))]
             middle = 0.5 * (box[:2] + box[2:]) + rng.uniform(-0.42, 0.42, 2) * part
         elif len(alikes) and choice < 0.9:
-            middle = alikes[rng.integers(len(alikes))] + rng.uniform(-0.42, 0.42, 2) * part
+            alike = alikes[rng.integers(len(alikes))]
+            middle = 0.5 * (alike[:2] + alike[2:]) + rng.uniform(-0.42, 0.42, 2) * part
         x, y = (int(v) for v in np.clip(middle - part / 2, 0, whole - part))
         limits = [x, y, x + part_px[0], y + part_px[1]]
         share = _share(np.clip(boxes, limits[:2] * 2, limits[2:] * 2), boxes)

@@ -1,7 +1,6 @@
 """The trained network as an ONNX file that describes itself."""
 
 import json
-from copy import deepcopy
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,8 @@ import onnxruntime
 import torch
 
 from tools.train_detector.dataset import INPUT_PX
-from tools.train_detector.network import STRIDES, Deployed, Detector, fuse
+from tools.train_detector.deployment import Deployed
+from tools.train_detector.network import STRIDES, Detector
 
 
 class ExportError(RuntimeError):
@@ -31,10 +31,10 @@ def export(detector: Detector, path: Path, names: tuple[str, ...], about: dict[s
     The file's metadata say what it is: `names`, `stride`, `task`, and `about`. Its input size is dynamic, sides are
     multiples of 16.
     """
-    plain = Deployed(fuse(deepcopy(detector).eval())).eval()
+    plain = Deployed(detector).eval()
     example = torch.rand(1, 3, INPUT_PX[1], INPUT_PX[0])
     with torch.no_grad():
-        expected = Deployed(detector.eval())(example).numpy()
+        logits, boxes = detector.eval()(example)
         torch.onnx.export(
             plain,
             (example,),
@@ -56,7 +56,11 @@ def export(detector: Detector, path: Path, names: tuple[str, ...], about: dict[s
     onnx.checker.check_model(onnx.load(str(path)))
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     answer = session.run(None, {"images": example.numpy()})[0]
-    apart = float(np.abs(answer - expected).max())
+    corners = np.concatenate([answer[..., :2] - answer[..., 2:4] / 2, answer[..., :2] + answer[..., 2:4] / 2], axis=2)
+    apart = float(np.abs(corners - boxes.numpy()).max())
+    doubt = float(np.abs(answer[..., 4:5] * answer[..., 5:] - torch.sigmoid(logits).numpy()).max())
+    if doubt > 1e-3:
+        raise ExportError(f"{path}: the exported model's scores are {doubt:.3g} off the trained one's")
     if apart > 0.05:
         raise ExportError(f"{path}: the exported model is {apart:.3g} off the trained one: allowed is 0.05")
     return apart

@@ -11,7 +11,8 @@ from tools.train_detector.assignment import Assignment
 _FOCUS = 2.0
 _NEGATIVE_WEIGHT = 4.0
 _GIOU_WEIGHT = 2.5
-_L1_WEIGHT = 2.0
+_L1_WEIGHT = 5.0
+_L1_SOFT_PX = 0.5
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ def detection_loss(logits: Tensor, boxes: Tensor, wanted: Assignment) -> Loss:
     apart = 1.0 - generalised_iou(found, truth)
     # Sides off by a pixel matter alike for all sizes above the smallest: corners are what the metric subtracts.
     side = (truth[:, 2:] - truth[:, :2]).amax(1).clamp(min=8.0)
-    off = functional.smooth_l1_loss(found, truth, reduction="none", beta=1.0).mean(1) / side.sqrt()
+    off = functional.smooth_l1_loss(found, truth, reduction="none", beta=_L1_SOFT_PX).mean(1) / side.sqrt()
     box = ((_GIOU_WEIGHT * apart + _L1_WEIGHT * off) * importance).sum() / weight
     return Loss(score + box, float(score.detach()), float(box.detach()))
 

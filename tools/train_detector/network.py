@@ -137,13 +137,8 @@ class Detector(nn.Module):
         N runs over the cells of stride 8, row by row, then those of stride 16. Sides are multiples of 16; the smallest
         map is upsampled to its neighbour's size, so that 240 rows (15 at stride 16) need no padding.
         """
-        eight = self.eight(self.four(self.stem(images)))
-        sixteen = self.sixteen(eight)
-        deep = self.lower(self.thirtytwo(sixteen))
-        sixteen = self.join_sixteen(torch.cat([sixteen, _to_size_of(deep, sixteen)], dim=1))
-        eight = self.join_eight(torch.cat([eight, functional.interpolate(self.low(sixteen), scale_factor=2.0)], dim=1))
         scores, boxes = [], []
-        for head, features in zip(self.heads, (eight, sixteen), strict=True):
+        for head, features in zip(self.heads, self.features(images), strict=True):
             logits, distances = head(features)
             scores.append(logits.flatten(2).transpose(1, 2))
             centers = cell_centers(features.shape[2], features.shape[3], head.stride, images.device)
@@ -151,20 +146,14 @@ class Detector(nn.Module):
             boxes.append(torch.cat([centers - distances[..., :2], centers + distances[..., 2:]], dim=2))
         return torch.cat(scores, dim=1), torch.cat(boxes, dim=1)
 
-
-class Deployed(nn.Module):
-    """What is exported: one output (B, N, 5 + classes), centre and size in input pixels, objectness 1, scores 0..1."""
-
-    def __init__(self, detector: Detector) -> None:
-        super().__init__()
-        self.detector = detector
-
-    def forward(self, images: Tensor) -> Tensor:
-        """(B, 3, h, w) in 0..1 RGB to (B, N, 5 + classes)."""
-        logits, boxes = self.detector(images)
-        corner, far = boxes[..., :2], boxes[..., 2:]
-        scores = torch.sigmoid(logits)
-        return torch.cat([(corner + far) * 0.5, far - corner, torch.ones_like(scores[..., :1]), scores], dim=2)
+    def features(self, images: Tensor) -> tuple[Tensor, Tensor]:
+        """Return what the heads of strides 8 and 16 see of images (B, 3, h, w)."""
+        eight = self.eight(self.four(self.stem(images)))
+        sixteen = self.sixteen(eight)
+        deep = self.lower(self.thirtytwo(sixteen))
+        sixteen = self.join_sixteen(torch.cat([sixteen, _to_size_of(deep, sixteen)], dim=1))
+        eight = self.join_eight(torch.cat([eight, functional.interpolate(self.low(sixteen), scale_factor=2.0)], dim=1))
+        return eight, sixteen
 
 
 def cell_centers(rows: int, columns: int, stride: int, device: torch.device) -> Tensor:
@@ -177,13 +166,3 @@ def _to_size_of(small: Tensor, large: Tensor) -> Tensor:
     """Double by nearest neighbours and cut to the larger map (an odd side leaves half a cell over)."""
     doubled = functional.interpolate(small, scale_factor=2.0)
     return doubled[:, :, : large.shape[2], : large.shape[3]]
-
-
-def fuse(module: nn.Module) -> nn.Module:
-    """Fold every batch normalisation into its convolution, in place; for `eval` networks only."""
-    for name, child in module.named_children():
-        if isinstance(child, ConvUnit):
-            setattr(module, name, child.fused())
-        else:
-            fuse(child)
-    return module

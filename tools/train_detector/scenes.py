@@ -30,8 +30,8 @@ class View:
 
     `boxes_px` (M, 4) xyxy with the origin at the centre of the top-left pixel: the geometric outline where nothing
     hides any of it, else the box of what is seen. `visible` (M,) is the share of each outline that is seen, what lies
-    beyond the border counted as unseen. `cut` (M,) tells which ones the border cuts. `alike_px` (K, 2) are the centres
-    of the look-alikes in view.
+    beyond the border counted as unseen. `cut` (M,) tells which ones the border cuts. `alike_px` (K, 4) are
+    boxes about the look-alikes in view, to a third of their size.
     """
 
     image: Image
@@ -171,7 +171,7 @@ class Stage:
             np.array(boxes, np.float64).reshape(-1, 4),
             np.array(shares),
             np.array(cuts, bool),
-            np.array(alikes, np.float64).reshape(-1, 2),
+            np.array(alikes, np.float64).reshape(-1, 4),
         )
 
     def _pose_head(self) -> None:
@@ -183,10 +183,14 @@ class Stage:
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_camlight(self._model, data)
 
-    def _place_alike(self, number: int, shown: bool) -> tuple[float, float] | None:
-        """Put a look-alike somewhere; a puzzle whole, since of one that is cut nobody can count the cells."""
+    def _place_alike(self, number: int, shown: bool) -> Array | None:
+        """Put a look-alike somewhere and return about its box (4,) [px].
+
+        A puzzle is put whole, since of one that is cut nobody can count the cells.
+        """
         width_px = _width_px(self._rng, self._smallest_px[number])
-        return self._place(f"alike{number}", shown, width_px, 2.0 * width_px if self._puzzles[number] else 0.0)
+        place = self._place(f"alike{number}", shown, width_px, 2.0 * width_px if self._puzzles[number] else 0.0)
+        return None if place is None else np.tile(place, 2) + 1.2 * width_px * np.array([-1.0, -1.0, 1.0, 1.0])
 
     def _place(self, name: str, shown: bool, width_px: float, margin_px: float = 0.0) -> tuple[float, float] | None:
         """Put a thing where a cube would be `width_px` wide in half-size images, its middle off the border."""

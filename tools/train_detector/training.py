@@ -12,10 +12,11 @@ import torch
 from torch import Tensor, nn
 
 from tools.train_detector.assignment import assign
-from tools.train_detector.augmentation import Strength, part_of
+from tools.train_detector.augmentation import Strength, closer_look, part_of
 from tools.train_detector.dataset import INPUT_PX, MOST, Shard
 from tools.train_detector.losses import detection_loss
 from tools.train_detector.network import STRIDES, Detector, cell_centers
+from vergence_metric.boxes.second_look import CROP_PX as CLOSER_PX
 
 CROP_PX = (192, 144)
 _LOG_EVERY = 50
@@ -25,8 +26,10 @@ _LOG_EVERY = 50
 class Schedule:
     """How long [min of wall time] and how fast.
 
-    The first `crop_share` of the time goes to crops about the objects: most of a render is background, and a crop
-    costs a third of it. The rest sees whole renders, the last `plain_share` all but unchanged.
+    `closer_share` of the batches are second looks, cut as the node cuts them. Of the others, the first `crop_share` of
+    the time sees crops about the objects: most of a render is background, and a crop costs a third of it; then whole
+    renders, the last `plain_share` all but unchanged. The statistics of batch normalisation are held for the last
+    `held_share`: batches of several kinds differ in them, and a deployed network has but one set.
 
     Time, not steps, drives the learning rate: a busy machine trains less, but to the end of its cycle.
     """
@@ -34,12 +37,15 @@ class Schedule:
     minutes: float
     batch: int = 16
     crop_batch: int = 32
+    closer_batch: int = 48
+    closer_share: float = 0.4
     crop_share: float = 0.85
     rate: float = 3e-3
     weight_decay: float = 0.02
     warm_up: int = 200
     average: float = 0.999
     plain_share: float = 0.07
+    held_share: float = 0.5
     seed: int = 1
 
 
@@ -79,6 +85,8 @@ def train(
     sums = np.zeros(2)
     while share < 1.0:
         images, truth, valid = next(batches)
+        if share >= 1 - schedule.held_share:
+            _hold_statistics(detector)
         for group in optimiser.param_groups:
             group["lr"] = schedule.rate * _factor(step, share, schedule)
         with torch.autocast("cpu", torch.bfloat16):
@@ -113,6 +121,12 @@ def all_centers(width: int, height: int) -> Tensor:
     return torch.cat([cell_centers(height // s, width // s, s, torch.device("cpu")) for s in STRIDES])
 
 
+def _hold_statistics(detector: nn.Module) -> None:
+    for module in detector.modules():
+        if isinstance(module, nn.BatchNorm2d):
+            module.eval()
+
+
 def _factor(step: int, share: float, schedule: Schedule) -> float:
     warm = min((step + 1) / schedule.warm_up, 1.0)
     return warm * (0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * min(share, 1.0))))
@@ -137,12 +151,15 @@ def _batches(
         while True:
             plain, cropped = share() >= 1 - schedule.plain_share, share() < schedule.crop_share
             strength = Strength(0.0, 0.0) if plain else Strength()
-            chosen = order[start : start + (schedule.crop_batch if cropped else schedule.batch)]
+            closer = rng.random() < schedule.closer_share
+            size_px = CLOSER_PX if closer else CROP_PX if cropped else INPUT_PX
+            count = schedule.closer_batch if closer else schedule.crop_batch if cropped else schedule.batch
+            chosen = order[start : start + count]
             start += len(chosen)
             # A smaller batch at the end is left out, unless it is all there is.
             if start >= len(order) and start > len(chosen):
                 break
-            yield _batch(rng, data, chosen, strength, CROP_PX if cropped else None)
+            yield _batch(rng, data, chosen, strength, size_px, closer_look if closer else part_of)
 
 
 def _batch(
@@ -150,15 +167,16 @@ def _batch(
     data: Shard,
     chosen: np.ndarray,
     strength: Strength,
-    crop_px: tuple[int, int] | None,
+    size_px: tuple[int, int],
+    vary: Callable[..., tuple[np.ndarray, np.ndarray]],
 ) -> tuple[Tensor, Tensor, Tensor]:
-    width, height = crop_px or INPUT_PX
+    width, height = size_px
     images = np.empty((len(chosen), 3, height, width), np.float32)
     truth, valid = torch.zeros(len(chosen), MOST, 4), torch.zeros(len(chosen), MOST, dtype=torch.bool)
     for row, i in enumerate(chosen):
         alikes = data.alikes[i][~np.isnan(data.alikes[i, :, 0])]
         boxes = data.boxes[i, : data.count[i]]
-        image, boxes = part_of(rng, data.images[i], boxes, alikes, (width, height), strength)
+        image, boxes = vary(rng, data.images[i], boxes, alikes, size_px, strength)
         images[row] = image[:, :, ::-1].transpose(2, 0, 1) * np.float32(1 / 255)
         truth[row, : len(boxes)] = torch.from_numpy(boxes.astype(np.float32))
         valid[row, : len(boxes)] = True

@@ -1,14 +1,22 @@
 """The closer look at a box: where its crop lies, what it makes of sides and scores."""
 
+from pathlib import Path
+
+import cv2
 import numpy as np
+import onnx
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vergence_metric.box_parameters import DetectorParameters
+from vergence_metric.boxes import Detector
 from vergence_metric.boxes.decoding import Raw
-from vergence_metric.boxes.second_look import CROP_PX, MOST_LOOKS, look_again
+from vergence_metric.boxes.second_look import CROP_PX, MOST_LOOKS, Window, look_again
+from vergence_metric.boxes.session import SHIPPED_MODEL
 
 SIZE = (640, 480)
+FIRST_SCALE = 2.0
 
 
 def picture(box):
@@ -19,7 +27,11 @@ def picture(box):
     return image
 
 
-def bright(crop):
+def bright(crops):
+    return [brightest(crop) for crop in crops]
+
+
+def brightest(crop):
     """See the white rectangle to a fraction of a pixel: half-bright pixels at its sides count by their brightness."""
     grey = (crop[..., 0].astype(float) - 40) / 215
     rows, columns = grey.max(1), grey.max(0)
@@ -36,8 +48,8 @@ def bright(crop):
     return Raw(np.array([[x0, y0, width_end, height_end]], float), np.array([0.9]), np.array([0]))
 
 
-def nothing(_):
-    return Raw(np.empty((0, 4)), np.empty(0), np.empty(0, np.int64))
+def nothing(crops):
+    return [Raw(np.empty((0, 4)), np.empty(0), np.empty(0, np.int64)) for _ in crops]
 
 
 @settings(deadline=None, max_examples=40)
@@ -51,42 +63,71 @@ def nothing(_):
 def test_a_thing_seen_again_gets_finer_sides(x, y, width, height, off):
     true = np.array([x - 0.5, y - 0.5, x + width - 0.5, y + height - 0.5])
     first = true + np.array(off) * [width, height, width, height]
-    boxes, scores = look_again(picture(true), first[None], np.array([0.6]), np.array([0]), bright)
-    scale = max(2.3 * width / CROP_PX[0], 2.3 * height / CROP_PX[1], 1.0)
-    # A third of the first look's error stays, and a pixel or so of the crop.
-    np.testing.assert_allclose(boxes[0], true, atol=np.abs(off).max() * max(width, height) / 3 + 2.0 * scale)
+    boxes, scores = look_again(picture(true), first[None], np.array([0.6]), np.array([0]), FIRST_SCALE, bright)
+    scale = max(1.7 * width / CROP_PX[0], 1.7 * height / CROP_PX[1], 0.3)
+    # Of the first look's error its share stays, and a pixel or so of the crop.
+    stays = scale**2 / (scale**2 + FIRST_SCALE**2)
+    np.testing.assert_allclose(boxes[0], true, atol=stays * np.abs(off).max() * max(width, height) + 2.0 * scale)
     assert scores[0] == pytest.approx(0.5 * 0.6 + 0.5 * 0.9)
+
+
+def test_the_look_with_the_finer_pixels_counts_more():
+    box, size = np.array([100.0, 100, 160, 160]), (SIZE[0], SIZE[1])
+    own = Window.about(box, size).scale
+    coarse, alike, fine = (
+        look_again(picture(box + 5.0), box[None], np.array([0.8]), np.array([0]), scale, bright)[0][0]
+        for scale in (1e4 * own, own, 1e-4 * own)
+    )
+    np.testing.assert_allclose(fine, box, atol=1e-3)
+    np.testing.assert_allclose(coarse, box + 5.0, atol=2.0 * own)
+    np.testing.assert_allclose(alike, 0.5 * (fine + coarse), atol=1e-3)
 
 
 def test_a_thing_that_the_closer_look_denies_loses_half_its_score():
     box = np.array([[100.0, 100, 160, 160]])
-    boxes, scores = look_again(picture(box[0]), box, np.array([0.8]), np.array([0]), nothing)
+    boxes, scores = look_again(picture(box[0]), box, np.array([0.8]), np.array([0]), FIRST_SCALE, nothing)
     np.testing.assert_array_equal(boxes, box)
     assert scores.tolist() == [0.4]
 
 
 def test_another_class_or_place_is_not_the_same_thing():
     box = np.array([[100.0, 100, 160, 160]])
-    _, other_class = look_again(picture(box[0]), box, np.array([0.8]), np.array([1]), bright)
+    _, other_class = look_again(picture(box[0]), box, np.array([0.8]), np.array([1]), FIRST_SCALE, bright)
     assert other_class.tolist() == [0.4]
-    _, elsewhere = look_again(picture((100, 100, 160, 160)), box + 25.0, np.array([0.8]), np.array([0]), bright)
+    _, elsewhere = look_again(
+        picture((100, 100, 160, 160)), box + 25.0, np.array([0.8]), np.array([0]), FIRST_SCALE, bright
+    )
     assert elsewhere.tolist() == [0.4]
 
 
 def test_looks_are_bounded_and_the_rest_stays():
-    seen = []
+    seen: list[tuple[int, ...]] = []
 
-    def count(crop):
-        seen.append(crop.shape)
-        return nothing(crop)
+    def count(crops):
+        seen.extend(crop.shape for crop in crops)
+        return nothing(crops)
 
     boxes = np.tile([[10.0, 10, 50, 50]], (9, 1)) + 45.0 * np.arange(9)[:, None]
-    _, scores = look_again(picture((0, 0, 4, 4)), boxes, np.full(9, 0.8), np.zeros(9, np.int64), count)
-    assert seen == [(CROP_PX[1], CROP_PX[0], 3)] * (2 * MOST_LOOKS)
+    _, scores = look_again(picture((0, 0, 4, 4)), boxes, np.full(9, 0.8), np.zeros(9, np.int64), FIRST_SCALE, count)
+    assert seen == [(CROP_PX[1], CROP_PX[0], 3)] * MOST_LOOKS
     assert scores.tolist() == [0.4] * MOST_LOOKS + [0.8] * (9 - MOST_LOOKS)
 
 
 @pytest.mark.parametrize("box", [(-0.5, -0.5, 40, 40), (600, 440, 639.5, 479.5), (-0.5, -0.5, 639.5, 479.5)])
 def test_boxes_at_the_border_and_of_the_whole_image_can_be_looked_at(box):
-    boxes, _ = look_again(picture(box), np.array([box], float), np.array([0.8]), np.array([0]), bright)
+    boxes, _ = look_again(picture(box), np.array([box], float), np.array([0.8]), np.array([0]), FIRST_SCALE, bright)
     assert np.isfinite(boxes).all()
+
+
+def test_crops_go_through_the_model_at_once_or_one_by_one_alike(tmp_path):
+    model = onnx.load(str(SHIPPED_MODEL))
+    for value in (*model.graph.input, *model.graph.output):
+        value.type.tensor_type.shape.dim[0].dim_value = 1
+    alone = tmp_path / "alone.onnx"
+    onnx.save(model, str(alone))
+    image = np.asarray(cv2.imread(str(Path(__file__).parents[3] / "docs" / "images" / "cube_left.jpg")))
+    twice = np.concatenate([image, np.roll(image, 100, axis=1)])
+    found = [Detector(DetectorParameters(model=path, threshold=0.3)).detect(twice) for path in ("", str(alone))]
+    assert len(found[0]) >= 2
+    np.testing.assert_allclose(found[0].xyxy_px, found[1].xyxy_px, atol=0.01)
+    np.testing.assert_allclose(found[0].scores, found[1].scores, atol=1e-3)

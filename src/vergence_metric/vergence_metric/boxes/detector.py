@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vergence_metric.box_parameters import DetectorParameters
 from vergence_metric.boxes.decoding import Raw, decode
 from vergence_metric.boxes.detections import Detections, make_detections
-from vergence_metric.boxes.errors import DetectorImageError, ModelClassError
+from vergence_metric.boxes.errors import DetectorError, DetectorImageError, ModelClassError
 from vergence_metric.boxes.layouts import find_layout
 from vergence_metric.boxes.letterbox import Letterbox, blob
 from vergence_metric.boxes.second_look import CROP_PX, look_again
@@ -64,6 +64,7 @@ class Detector:
         fixed = self._session.input.width_px or self._session.input.height_px
         # Suppression inside the model has its own threshold, which hides what a second look could have saved.
         self._takes_crops = not (fixed or self.layout.suppressed or any(s % self._session.stride_px() for s in CROP_PX))
+        self._at_once = self._takes_crops and self._takes_several()
         self.set_parameters(parameters)
 
     @property
@@ -114,7 +115,7 @@ class Detector:
             raw.class_ids[chosen],
         )
         if self.looks_twice:
-            boxes, scores = look_again(colour, boxes, scores, ids, self._see)
+            boxes, scores = look_again(colour, boxes, scores, ids, size[0] / self.input_px[0], self._see)
             # Two first boxes may turn out to be one thing.
             kept = suppress(boxes, scores, ids, p.iou, p.max_det)
             kept = kept[scores[kept] >= wanted]
@@ -126,10 +127,24 @@ class Detector:
         """True if boxes are looked at again: asked for, and the model takes crops."""
         return self._parameters.second_look and self._takes_crops
 
-    def _see(self, picture: NDArray[np.uint8]) -> Raw:
+    def _see(self, pictures: list[NDArray[np.uint8]]) -> list[Raw]:
         how = self.preprocessing
-        tensor = blob(picture, how.color, how.unit_scale, self._session.input.dtype)
-        return decode(self.layout, self._session.run(tensor), CROP_PX, _CLOSER_LEAST)
+        found = []
+        for several in [pictures] if self._at_once else [[picture] for picture in pictures]:
+            outputs = self._session.run(blob(several, how.color, how.unit_scale, self._session.input.dtype))
+            for i in range(len(several)):
+                one = [output[i : i + 1] for output in outputs]
+                found.append(decode(self.layout, one, CROP_PX, _CLOSER_LEAST))
+        return found
+
+    def _takes_several(self) -> bool:
+        """Tell whether the model takes several crops at once; a declared batch size proves nothing."""
+        how, picture = self.preprocessing, np.full((CROP_PX[1], CROP_PX[0], 3), _GREY, np.uint8)
+        try:
+            outputs = self._session.run(blob([picture] * 2, how.color, how.unit_scale, self._session.input.dtype))
+        except DetectorError:
+            return False
+        return all(len(outputs[i]) == 2 for i in self.layout.outputs)
 
     def _tensor(self, colour: NDArray[np.uint8]) -> NDArray[Any]:
         size = (colour.shape[1], colour.shape[0])

@@ -3,6 +3,7 @@
 Detectors count from the outer corner of the top-left pixel; the rest of this package from its centre, half a pixel off.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,13 +70,23 @@ class Letterbox:
         return (boxes + 0.5) * (self.scale * 2) + self.offset_px * 2
 
 
-def blob(picture: NDArray[np.uint8], color: str, unit_scale: bool, dtype: type[np.floating[Any]]) -> NDArray[Any]:
-    """Return the input tensor (1, 3, h, w) of a BGR picture (h, w, 3): `color` rgb or bgr, 0..1 or 0..255."""
-    tensor = np.empty((1, 3, *picture.shape[:2]), dtype)
+def blob(
+    pictures: NDArray[np.uint8] | Sequence[NDArray[np.uint8]],
+    color: str,
+    unit_scale: bool,
+    dtype: type[np.floating[Any]],
+) -> NDArray[Any]:
+    """Return the input tensor (B, 3, h, w) of BGR pictures (h, w, 3), one or B of one size.
+
+    `color` is rgb or bgr; values are 0..1 or 0..255.
+    """
+    several = [pictures] if isinstance(pictures, np.ndarray) else pictures
+    tensor = np.empty((len(several), 3, *several[0].shape[:2]), dtype)
     # Plane by plane: converting the interleaved picture as a whole takes five times as long.
-    for plane, channel in zip(tensor[0][:: -1 if color == "rgb" else 1], cv2.split(picture), strict=True):
-        if unit_scale:
-            np.multiply(channel, dtype(1.0 / 255.0), out=plane)
-        else:
-            plane[:] = channel
+    for planes, picture in zip(tensor, several, strict=True):
+        for plane, channel in zip(planes[:: -1 if color == "rgb" else 1], cv2.split(picture), strict=True):
+            if unit_scale:
+                np.multiply(channel, dtype(1.0 / 255.0), out=plane)
+            else:
+                plane[:] = channel
     return tensor

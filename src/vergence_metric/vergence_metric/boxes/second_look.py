@@ -1,6 +1,6 @@
 """A second look: the same network on a crop of the full image about each box, for finer sides and a surer score."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +13,10 @@ from vergence_metric.boxes.decoding import Raw
 MOST_LOOKS = 4
 """Boxes of an image that are looked at again; weaker ones stay as they are."""
 
-CROP_PX = (128, 96)
-"""Of the crop as the network sees it (width, height): whole strides, a sixth of the usual input."""
+CROP_PX = (96, 96)
+"""Of the crop as the network sees it (width, height): whole strides, an eighth of the usual input."""
 
-_CROP_SHARE = 1.7  # of the box's sides
+_CROP_SHARE = 1.5  # of the box's sides
 _LARGEST_ZOOM = 3.3  # beyond, there is nothing finer to see
 _ANTIALIAS = 0.45
 _SAME = 0.4  # overlap of the two looks' boxes
@@ -24,29 +24,36 @@ _GREY = 114
 
 
 @dataclass(frozen=True)
-class _Window:
-    """Where a crop lies: its outer corner in the image and image pixels per pixel of the crop."""
+class Window:
+    """Where a crop lies: its outer corner in the image [px], image pixels per pixel of the crop, (width, height)."""
 
     x: float
     y: float
     scale: float
+    size_px: tuple[int, int]
 
     @classmethod
-    def about(cls, xyxy: NDArray[np.float64], image_px: tuple[int, int]) -> "_Window":
+    def about(
+        cls, xyxy: NDArray[np.float64], image_px: tuple[int, int], size_px: tuple[int, int] = CROP_PX
+    ) -> "Window":
+        """Return the window of a closer look at a box (4,) in raw pixels of an image of (width, height)."""
         size = xyxy[2:] - xyxy[:2]
-        scale = max(float((_CROP_SHARE * size / CROP_PX).max()), 1.0 / _LARGEST_ZOOM)
-        covered = scale * np.array(CROP_PX)
+        scale = max(float((_CROP_SHARE * size / size_px).max()), 1.0 / _LARGEST_ZOOM)
+        covered = scale * np.array(size_px)
         room = np.array(image_px) - covered
         corner = 0.5 * (xyxy[:2] + xyxy[2:]) + 0.5 - 0.5 * covered
         # Within the image, as far as that is possible: what lies beyond it tells nothing.
         corner = np.where(room >= 0, np.clip(corner, 0, np.maximum(room, 0)), 0.5 * room)
-        return cls(float(corner[0]), float(corner[1]), scale)
+        return cls(float(corner[0]), float(corner[1]), scale, size_px)
 
     def of(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the crop (height, width, 3) of an image; what lies beyond it is grey."""
         s = self.scale
         height, width = image.shape[:2]
         low_x, low_y = max(int(self.x) - 4, 0), max(int(self.y) - 4, 0)
-        high_x, high_y = (int(corner + s * side) + 5 for corner, side in zip((self.x, self.y), CROP_PX, strict=True))
+        high_x, high_y = (
+            int(corner + s * side) + 5 for corner, side in zip((self.x, self.y), self.size_px, strict=True)
+        )
         part = image[low_y : min(high_y, height), low_x : min(high_x, width)]
         if s > 1.3:
             part = np.asarray(cv2.GaussianBlur(part, (0, 0), _ANTIALIAS * s))
@@ -56,7 +63,12 @@ class _Window:
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         return np.asarray(
             cv2.warpAffine(
-                part, matrix, CROP_PX, flags=flags, borderMode=cv2.BORDER_CONSTANT, borderValue=(_GREY, _GREY, _GREY)
+                part,
+                matrix,
+                self.size_px,
+                flags=flags,
+                borderMode=cv2.BORDER_CONSTANT,
+                borderValue=(_GREY, _GREY, _GREY),
             ),
             np.uint8,
         )
@@ -71,43 +83,36 @@ def look_again(
     xyxy_px: NDArray[np.float64],
     scores: NDArray[np.float64],
     class_ids: NDArray[np.int64],
-    see: Callable[[NDArray[np.uint8]], Raw],
+    first_scale: float,
+    see: Callable[[list[NDArray[np.uint8]]], Sequence[Raw]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return boxes (N, 4) and scores (N,) after a closer look at the best ones.
 
-    The closer look is taken at the crop and at its mirror image: their errors have little in common. A box gets the
-    mean of its sides over all looks that see it with its class; its score is the mean of the first look's and of both
-    closer ones', of which one that does not see it gives 0.
+    A box's score is the mean of both looks', 0 for a closer one that does not see it with its class. Its sides are
+    their mean, weighted as if each look erred by the same share of its own pixels.
 
     Args:
         image: (h, w, 3) BGR.
         xyxy_px: boxes in its pixels, best first.
         scores: theirs.
         class_ids: theirs.
-        see: what the network finds in a picture of CROP_PX: all candidates, down to low scores.
+        first_scale: image pixels per pixel of the first look.
+        see: what the network finds in each of several pictures of CROP_PX: all candidates, down to low scores.
 
     """
     boxes, sure = xyxy_px.copy(), scores.copy()
-    for i in range(min(len(boxes), MOST_LOOKS)):
-        window = _Window.about(xyxy_px[i], (image.shape[1], image.shape[0]))
-        crop = window.of(image)
-        looks = []
-        for mirrored in (False, True):
-            raw = see(np.ascontiguousarray(crop[:, ::-1]) if mirrored else crop)
-            seen = window.to_image(_mirrored(raw.xyxy) if mirrored else raw.xyxy)
-            same = (_overlaps(seen, xyxy_px[i]) >= _SAME) & (raw.class_ids == class_ids[i])
-            if same.any():
-                best = int(np.flatnonzero(same)[raw.scores[same].argmax()])
-                looks.append((seen[best], float(raw.scores[best])))
-        # What only one of the looks denies is in doubt, not gone.
-        sure[i] = 0.5 * scores[i] + 0.25 * sum(score for _, score in looks)
-        boxes[i] = np.mean([xyxy_px[i], *(seen for seen, _ in looks)], axis=0)
+    windows = [Window.about(box, (image.shape[1], image.shape[0])) for box in xyxy_px[:MOST_LOOKS]]
+    found = see([window.of(image) for window in windows]) if windows else []
+    for i, (window, raw) in enumerate(zip(windows, found, strict=True)):
+        seen = window.to_image(raw.xyxy)
+        same = (_overlaps(seen, xyxy_px[i]) >= _SAME) & (raw.class_ids == class_ids[i])
+        sure[i] = 0.5 * scores[i]
+        if same.any():
+            best = int(np.flatnonzero(same)[raw.scores[same].argmax()])
+            sure[i] += 0.5 * float(raw.scores[best])
+            share = first_scale**2 / (first_scale**2 + window.scale**2)
+            boxes[i] = (1.0 - share) * xyxy_px[i] + share * seen[best]
     return boxes, sure
-
-
-def _mirrored(xyxy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the crop's boxes (N, 4) with left and right exchanged."""
-    return np.column_stack([CROP_PX[0] - xyxy[:, 2], xyxy[:, 1], CROP_PX[0] - xyxy[:, 0], xyxy[:, 3]])
 
 
 def _overlaps(boxes: NDArray[np.float64], box: NDArray[np.float64]) -> NDArray[Any]:
