@@ -4,7 +4,6 @@ import json
 import math
 import os
 import select
-import shutil
 import signal
 import statistics
 import subprocess
@@ -12,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,61 +27,6 @@ LEFT_M, RIGHT_M = (0.6, 0.25, 0.05), (0.5, -0.15, -0.05)
 NEAR_US = 8.0
 
 
-def ip(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(["ip", *arguments], capture_output=True, text=True, timeout=60)
-
-
-class Cable:
-    """Two namespaces, `laptop` and `pi`, each with one end of a veth pair."""
-
-    def __init__(self) -> None:
-        self.name = f"vg{os.getpid()}"
-        self.laptop, self.pi = f"{self.name}_laptop", f"{self.name}_pi"
-
-    def lay(self) -> None:
-        """Make the namespaces and join them. Raises OSError where this machine does not allow it."""
-        ends = ((self.laptop, f"{self.name}l", "10.98.76.1/24"), (self.pi, f"{self.name}p", "10.98.76.2/24"))
-        for namespace, _, _ in ends:
-            self._do("netns", "add", namespace)
-        self._do("link", "add", ends[0][1], "netns", self.laptop, "type", "veth", "peer", ends[1][1], "netns", self.pi)
-        for namespace, link, address in ends:
-            self._do("-n", namespace, "addr", "add", address, "dev", link)
-            self._do("-n", namespace, "link", "set", "lo", "up")
-            self._do("-n", namespace, "link", "set", link, "up", "multicast", "on")
-            self._do("-n", namespace, "route", "add", "224.0.0.0/4", "dev", link)
-
-    def pull(self) -> None:
-        self._do("-n", self.laptop, "link", "set", f"{self.name}l", "down")
-
-    def plug(self) -> None:
-        self._do("-n", self.laptop, "link", "set", f"{self.name}l", "up")
-        self._do("-n", self.laptop, "route", "replace", "224.0.0.0/4", "dev", f"{self.name}l")
-
-    def remove(self) -> None:
-        for namespace in (self.laptop, self.pi):
-            ip("netns", "del", namespace)
-
-    def _do(self, *arguments: str) -> None:
-        done = ip(*arguments)
-        if done.returncode:
-            raise OSError(f"ip {' '.join(arguments)}: {done.stderr.strip()}")
-
-
-@pytest.fixture
-def cable() -> Iterator[Cable]:
-    if os.geteuid() != 0 or shutil.which("ip") is None:
-        pytest.skip("network namespaces need root and the ip command")
-    made = Cable()
-    try:
-        try:
-            made.lay()
-        except OSError as error:
-            pytest.skip(f"this machine gives no network namespaces: {error}")
-        yield made
-    finally:
-        made.remove()
-
-
 def attribute(path: Path) -> int:
     """Read a number that somebody may just be writing: a file, unlike sysfs, is empty for that moment."""
     while not (text := path.read_text().strip()):
@@ -92,7 +37,7 @@ def attribute(path: Path) -> int:
 class Machines:
     """Processes on both machines, and the wires of the Pi's servos."""
 
-    def __init__(self, cable: Cable, folder: Path) -> None:
+    def __init__(self, cable: Any, folder: Path) -> None:
         self.cable = cable
         self.duty = folder / "pwmchip0" / "pwm0" / "duty_cycle"
         for number in range(3):
@@ -185,7 +130,7 @@ class Machines:
 
 
 @pytest.fixture
-def machines(cable: Cable, tmp_path: Path, domain_id: int) -> Iterator[Machines]:
+def machines(cable: Any, tmp_path: Path, domain_id: int) -> Iterator[Machines]:
     both = Machines(cable, tmp_path)
     yield both
     both.close()
