@@ -1,0 +1,145 @@
+"""Targets that swing, jump, and pass before another: the whole core against the fake head, at the head's 50 Hz."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vergence_rig.rig import default_rig
+from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
+from vergence_servo.gaze.controller import GazeController
+from vergence_servo.gaze.fake_head import TICK_S, FakeHead, Seeing
+from vergence_servo.gaze.goals import Goal, GoalKind
+from vergence_servo.gaze.parameters import GazeParameters
+from vergence_servo.gaze.phases import Phase
+
+CONTROL_TICKS = 6
+FRAME_RATE = Seeing(track=False, boxes=True, box_frame_ticks=10, box_latency_s=0.06, box_noise_px=0.4, box_miss_share=0)
+DETECTOR = Seeing(track=False, boxes=True, box_frame_ticks=20, box_latency_s=0.1, box_noise_px=1.2, noise_px=0.4)
+Place = Callable[[float], np.ndarray]
+
+
+@dataclass
+class Trial:
+    """What came of a target that is known by its class, or by a click; sampled at the control rate."""
+
+    target: Place
+    seeing: Seeing
+    servo: ServoSpec = IDEAL
+    until_s: float = 4.0
+    law: str = "predictive"
+    click: bool = False
+    seed: int = 3
+    mistaken: Mapping[str, Callable[[float], Any]] = field(default_factory=dict)
+    start_rad: Mapping[str, float] | None = None
+
+    def __post_init__(self) -> None:
+        rig = default_rig().with_servos(self.servo)
+        start = fixating(self.target(0.0)) if self.start_rad is None else self.start_rad
+        head = FakeHead(rig, self.target, self.seeing, self.seed, start, mistaken=self.mistaken)
+        controller = GazeController(rig, GazeParameters(law=self.law), CONTROL_TICKS * TICK_S)
+        arrived: list[Any] = []
+        samples: list[tuple[float, float, Phase, bool]] = []
+        for tick in range(1, int(self.until_s / TICK_S)):
+            arrived += head.advance()
+            if tick % CONTROL_TICKS:
+                continue
+            if tick == 30:
+                x, y = head.project(head.target(head.time_s), left=True)
+                goal = Goal(GoalKind.PIXEL, left_xy=(float(x), float(y)), time_limit_s=60.0)
+                goal = goal if self.click else Goal(GoalKind.CLASS, class_name="target", time_limit_s=60.0)
+                controller.look_at(goal, head.time_s)
+            command = controller.step(head.time_s, arrived)
+            arrived = []
+            if command.joints_rad is not None:
+                head.command(command.joints_rad)
+            error_deg = float(np.abs(np.degrees(head.true_errors_rad())).max())
+            samples.append((head.time_s, error_deg, command.report.phase, command.report.verged))
+        self.time_s = np.array([sample[0] for sample in samples])
+        self.error_deg = np.array([sample[1] for sample in samples])
+        self.phases = [sample[2] for sample in samples]
+        self.verged = np.array([sample[3] for sample in samples])
+
+    def settled_s(self, after_s: float, within_deg: float) -> float:
+        late = self.time_s > after_s
+        outside = np.flatnonzero(self.error_deg[late] > within_deg)
+        return float(self.time_s[late][outside[-1]]) - after_s if outside.size else 0.0
+
+
+def place(distance_m: float, azimuth_deg: float) -> np.ndarray:
+    azimuth = math.radians(azimuth_deg)
+    return distance_m * np.array([math.cos(azimuth), math.sin(azimuth), 0.05])
+
+
+def fixating(point_m: np.ndarray) -> dict[str, float]:
+    x, y, z = point_m
+    half, forward = 0.5 * default_rig().baseline_m, math.hypot(x, z)
+    return {
+        "pan_left": math.atan2(y - half, forward),
+        "pan_right": math.atan2(y + half, forward),
+        "tilt": math.atan2(-z, x),
+    }
+
+
+def jump(before: np.ndarray, after: np.ndarray) -> Place:
+    return lambda time_s: before if time_s < 1.5 else after
+
+
+@pytest.mark.parametrize(("servo", "mean_deg"), [(IDEAL, 3.0), (SG90, 5.0)], ids=["ideal", "sg90"])
+def test_a_swing_of_one_hertz_is_followed(servo: ServoSpec, mean_deg: float) -> None:
+    def swing(time_s: float) -> np.ndarray:
+        return place(0.8, 10.0 * math.sin(math.tau * max(time_s - 0.5, 0.0)))
+
+    trial = Trial(swing, FRAME_RATE, servo, until_s=5.0)
+    assert trial.error_deg[trial.time_s > 1.6].mean() < mean_deg
+    assert Phase.LOST not in trial.phases[int(1.6 / (CONTROL_TICKS * TICK_S)) :]
+
+
+@pytest.mark.parametrize("servo", [IDEAL, SG90], ids=["ideal", "sg90"])
+@pytest.mark.parametrize(
+    ("after", "soon_s"), [(place(0.8, 18.0), 0.25), (place(1.6, 3.0), 0.3), (place(0.4, 3.0), 0.3)]
+)
+def test_a_target_that_jumps_is_followed_at_once(servo: ServoSpec, after: np.ndarray, soon_s: float) -> None:
+    trial = Trial(jump(place(0.8, 3.0), after), FRAME_RATE, servo, until_s=3.0)
+    assert trial.settled_s(1.5, 0.3 if servo is IDEAL else 0.75) < soon_s
+
+
+@pytest.mark.parametrize("click", [False, True], ids=["by_boxes", "by_track"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_target_that_passes_before_another_is_kept(click: bool, seed: int) -> None:
+    random = np.random.default_rng([7, seed])
+    other = place(0.6 * random.uniform(1.6, 2.2), 0.0)
+
+    def azimuth_deg(time_s: float) -> float:
+        return 10.0 * (min(max(time_s, 1.0), 4.0) - 2.5)
+
+    def taken_for(near_deg: float, share: float) -> Callable[[float], np.ndarray | None]:
+        draws = random.random(100)
+
+        def mistaken(time_s: float) -> np.ndarray | None:
+            wrong = abs(azimuth_deg(time_s)) < near_deg and draws[int(max(time_s, 0.0) * 10.0)] < share
+            return other if wrong else None
+
+        return mistaken
+
+    mistaken = {"fovea": taken_for(2.5, 0.5), "track": taken_for(2.5, 0.5), "box": taken_for(6.0, 0.3)}
+    seeing = Seeing(noise_px=0.4) if click else DETECTOR
+    target = lambda time_s: place(0.6, azimuth_deg(time_s))  # noqa: E731
+    trial = Trial(target, seeing, SG90, 5.0, click=click, seed=seed, mistaken=mistaken)
+    assert trial.error_deg[trial.time_s > 4.5].max() < 1.0
+    if click:
+        assert trial.error_deg[np.abs(trial.time_s - 2.5) < 0.6].max() < 2.0
+
+
+@pytest.mark.parametrize("servo", [SG90, MG995], ids=["sg90", "mg995"])
+@pytest.mark.parametrize("seed", range(5))
+def test_eyes_that_swing_over_the_target_are_not_called_verged(servo: ServoSpec, seed: int) -> None:
+    random = np.random.default_rng([11, seed])
+    point = place(random.uniform(0.4, 1.5), random.uniform(-20.0, 20.0))
+    start = {"pan_left": -0.1, "pan_right": 0.0, "tilt": 0.1}
+    trial = Trial(lambda time_s: point, FRAME_RATE, servo, 3.0, law="pid_pursuit", seed=seed, start_rad=start)
+    assert trial.verged[-1]
+    assert trial.error_deg[trial.verged].max() < 1.0
