@@ -25,13 +25,14 @@ def main() -> int:
         started = time.monotonic()
         print(f"\n== {name}", flush=True)
         try:
-            rows = importlib.import_module(f"bench.bench_{name}").run(lambda text: print(f"   {text}", flush=True))
+            module = importlib.import_module(f"bench.bench_{name}")
+            rows = module.run(lambda text: print(f"   {text}", flush=True))
         except Exception as error:  # one benchmark's failure must not hide the others' figures
             print(f"   {name} failed: {type(error).__name__}: {error}", flush=True)
             failed.append(name)
             continue
         path = harness.write(name, rows)
-        print(harness.table(rows))
+        print(getattr(module, "table", harness.table)(rows))
         print(f"   {time.monotonic() - started:.0f} s, written to {path.relative_to(harness.OUT_DIR.parent.parent)}")
     if failed:
         print(f"\nfailed: {', '.join(failed)}")

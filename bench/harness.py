@@ -41,13 +41,15 @@ def table(rows: Iterable[Row]) -> str:
     """Return the rows as a table for the terminal."""
     lines = [("what", "value", "unit", "against", "its value")]
     for row in rows:
-        lines.append((row.what, _figure(row.value), row.unit, row.against or "", _figure(row.against_value)))
+        lines.append((row.what, figure_text(row.value), row.unit, row.against or "", figure_text(row.against_value)))
     widths = [max(len(line[i]) for line in lines) for i in range(5)]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines
     )
 
 
-def _figure(value: float | None) -> str:
-    value = _finite(value)
-    return "-" if value is None else f"{value:.4g}"
+def figure_text(value: float | None) -> str:
+    """Return a figure as the tables show it."""
+    if value is None or math.isnan(value):
+        return "-"
+    return "never" if math.isinf(value) else f"{value:.4g}"
