@@ -121,6 +121,10 @@ class NodeControls:
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
         changes = {p.name.removeprefix(PREFIX): p.value for p in parameters if p.name.startswith(PREFIX)}
         if changes and not self._passive:
+            shared = sorted(changes.keys() & set(self._port.locked_names())) if self._lock == "follow" else []
+            if shared:
+                reason = f"{PREFIX}{shared[0]} is the other eye's here (lock: follow): set it there"
+                return SetParametersResult(successful=False, reason=reason)
             try:
                 self._port.set(changes)
             except CameraError as error:

@@ -67,7 +67,7 @@ def test_both_eyes_are_locked_to_one_exposure_and_white_balance(
     playing(left, 20.0)
     playing(right, 20.0)
     leader = start("left", device="serial:AAA", lock="hold", lock_after_s=0.0)
-    start("right", device="serial:BBB", lock="follow", partner="/left/camera_node")
+    follower = start("right", device="serial:BBB", lock="follow", partner="/left/camera_node")
     graph.wait_until(lambda: right.controls[v4l2.CID_EXPOSURE_ABSOLUTE].value == 321, "the right eye follows")
     locked = (v4l2.CID_EXPOSURE_AUTO, v4l2.CID_AUTO_WHITE_BALANCE, v4l2.CID_WHITE_BALANCE_TEMPERATURE, v4l2.CID_GAIN)
     assert [right.controls[cid].value for cid in locked] == [1, 0, 5500, 16]
@@ -75,6 +75,12 @@ def test_both_eyes_are_locked_to_one_exposure_and_white_balance(
     assert graph.set_parameters(leader, **{"control.exposure_time_absolute": 200, "control.gain": 30}).successful
     graph.wait_until(lambda: right.controls[v4l2.CID_EXPOSURE_ABSOLUTE].value == 200, "and follows a change")
     assert right.controls[v4l2.CID_GAIN].value == 30
+    assert follower.has_parameter("control.gain")
+    alone = graph.set_parameters(follower, **{"control.gain": 99})
+    assert not alone.successful, "the eyes are no longer locked"
+    assert "set it there" in alone.reason
+    assert right.controls[v4l2.CID_GAIN].value == 30
+    assert graph.set_parameters(follower, **{"control.brightness": 5}).successful, "what is not shared is its own"
 
 
 def test_the_pair_is_judged(
