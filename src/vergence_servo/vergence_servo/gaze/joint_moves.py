@@ -52,6 +52,11 @@ class JointMoves:
             self._moves.append((self._history.newest_s, variances))
         return bool(np.any(move[:2]))
 
+    def variances_before(self, stamp_s: float) -> Array:
+        """Return the sum (3,) of the variances that `take_before` would take."""
+        waiting = [variances for moved_s, variances in self._moves if moved_s <= stamp_s]
+        return np.sum(waiting, axis=0) if waiting else np.zeros(3)
+
     def take_before(self, stamp_s: float) -> list[Array]:
         """Return, once, the variances of moves before an exposure: an earlier image knows nothing of them."""
         taken = []

@@ -1,22 +1,41 @@
 """When the eyes may be called verged: contrast, a small signed error and steady estimates, each with hysteresis."""
 
 import math
+from dataclasses import dataclass
 
 from vergence_servo.gaze.parameters import GazeParameters
 
 _CONTRAST_AGE_S = 0.5
 _SEEN_AGE_S = 1.0
 _PAIR_MATCH_S = 0.08
+_SAME_PAIR_S = 0.012
+
+
+@dataclass(frozen=True)
+class PairVerdict:
+    """What one pair says: see `VergedJudge.see_pair`."""
+
+    stamp_s: float
+    error_rad: float
+    steady: bool
+    resting: bool
+    doubt: float
 
 
 class VergedJudge:
-    """Takes one verdict per pair. `reason` says what is missing."""
+    """Takes one verdict per pair. `reason` says what is missing.
+
+    A pair is judged again when more is told of it: its own contrast, or another sighting. One pair suffices where
+    hardly a doubt is left and its own contrast agrees; otherwise `verged_pairs` in a row must say so.
+    """
 
     def __init__(self, parameters: GazeParameters) -> None:
         self._p = parameters
         self._contrast_s = -math.inf
         self._good = self._bad = 0
+        self._pair: PairVerdict | None = None
         self._last_pair_s = -math.inf
+        self._good_before = 0
         self.unresolved_rad = 0.0
         """Error that the servos cannot mend, beyond what the limits were made for: it keeps nobody from `verged`."""
         self.contrast = math.nan
@@ -27,14 +46,24 @@ class VergedJudge:
 
     def restart(self, reason: str = "new target") -> None:
         """Not verged until shown again."""
-        self.verged, self._good, self._bad = False, 0, 0
+        self.verged, self._good, self._bad, self._good_before = False, 0, 0, 0
+        self._pair = None
         self.since_s = math.nan
         self.reason = reason
 
-    def see_contrast(self, stamp_s: float, contrast: float, edge_verged: bool) -> None:
+    @property
+    def enter_rad(self) -> float:
+        """The largest error at which eyes become verged."""
+        return min(self._p.verged_enter_rad + self.unresolved_rad, self._p.verged_leave_rad)
+
+    def see_contrast(self, stamp_s: float, contrast: float, edge_verged: bool, now_s: float) -> None:
         """Take the edge metric's judgement of a pair."""
-        if math.isfinite(stamp_s) and stamp_s >= self._contrast_s:
-            self._contrast_s, self.contrast, self.edge_verged = stamp_s, contrast, edge_verged
+        if not (math.isfinite(stamp_s) and stamp_s >= self._contrast_s):
+            return
+        self._contrast_s, self.contrast, self.edge_verged = stamp_s, contrast, edge_verged
+        pair = self._pair
+        if pair is not None and not self.verged and self._is_own_contrast(pair):
+            self._enter(pair, now_s)
 
     def exposure_for(self, stamp_s: float, now_s: float) -> float:
         """Return when a target that no image gave is to be judged: at the newest image that counts, points are younger.
@@ -44,48 +73,71 @@ class VergedJudge:
         counts = self._p.contrast != "ignored" and now_s - self._contrast_s <= _SEEN_AGE_S
         return min(stamp_s, self._contrast_s) if counts else stamp_s
 
-    def see_pair(self, stamp_s: float, now_s: float, error_rad: float, steady: bool, resting: bool) -> bool:
+    def see_pair(
+        self, stamp_s: float, now_s: float, error_rad: float, steady: bool, resting: bool, doubt: float = 1.0
+    ) -> bool:
         """Judge one pair in which the target was measured; returns `verged`.
 
         Args:
-            stamp_s: the pair's stamp; every pair counts once.
+            stamp_s: the pair's stamp; every pair counts once, by the last that is told of it until it is verged.
             now_s: the present.
             error_rad: the larger of the vergence error and of the gaze directions' errors in that pair.
             steady: whether the estimate is certain enough.
             resting: whether the eyes were still enough in that pair to see.
+            doubt: the probability that the eyes are off after all, for all that was known before and is seen now.
         """
-        if not stamp_s > self._last_pair_s:
+        if not stamp_s >= self._last_pair_s or (stamp_s == self._last_pair_s and (self.verged or self._pair is None)):
             return self.verged
-        self._last_pair_s = stamp_s
-        leave_rad = self._p.verged_leave_rad
-        enter_rad = min(self._p.verged_enter_rad + self.unresolved_rad, leave_rad)
-        limit = leave_rad if self.verged else enter_rad
-        contrast_good, contrast_text = self._contrast_says(stamp_s, now_s)
-        if not abs(error_rad) <= limit:
-            good, self.reason = False, f"error {math.degrees(abs(error_rad)):.2f} deg"
-        elif not contrast_good:
-            good, self.reason = False, contrast_text
-        elif not (self.verged or (steady and resting)):
-            good, self.reason = False, "estimate not steady yet"
+        if stamp_s > self._last_pair_s:
+            self._last_pair_s, self._good_before = stamp_s, self._good
+        self._pair = PairVerdict(stamp_s, error_rad, steady, resting, doubt)
+        if self.verged:
+            self._stay(self._pair, now_s)
         else:
-            good, self.reason = True, "contrast, signed error and steadiness agree"
-        self._good, self._bad = (self._good + 1, 0) if good else (0, self._bad + 1)
-        if not self.verged and self._good >= self._p.verged_pairs:
-            self.verged, self.since_s = True, now_s
-        elif self.verged and self._bad >= self._p.unverged_pairs:
-            self.verged, self.since_s = False, math.nan
+            self._enter(self._pair, now_s)
         return self.verged
 
-    def _contrast_says(self, stamp_s: float, now_s: float) -> tuple[bool, str]:
-        if self._p.contrast == "ignored":
-            return True, ""
+    def _enter(self, pair: PairVerdict, now_s: float) -> None:
+        good = self._within(pair, now_s, self.enter_rad, self._p.contrast_enter)
+        if good and not (pair.steady and pair.resting):
+            good, self.reason = False, "estimate not steady yet"
+        self._good = self._good_before + 1 if good else 0
+        certain = pair.doubt <= self._p.verged_doubt and (
+            self._is_own_contrast(pair) or not self._heeds_contrast(now_s)
+        )
+        if good and (certain or self._good >= self._p.verged_pairs):
+            self.verged, self.since_s, self._bad = True, now_s, 0
+
+    def _stay(self, pair: PairVerdict, now_s: float) -> None:
+        good = self._within(pair, now_s, self._p.verged_leave_rad, self._p.contrast_leave)
+        self._bad = 0 if good else self._bad + 1
+        if self._bad >= self._p.unverged_pairs:
+            self.verged, self.since_s, self._good = False, math.nan, 0
+
+    def _within(self, pair: PairVerdict, now_s: float, limit_rad: float, contrast_limit: float) -> bool:
+        if not abs(pair.error_rad) <= limit_rad:
+            self.reason = f"error {math.degrees(abs(pair.error_rad)):.2f} deg"
+            return False
+        against = self._contrast_against(pair.stamp_s, now_s, contrast_limit)
+        self.reason = against or "contrast, signed error and steadiness agree"
+        return not against
+
+    def _is_own_contrast(self, pair: PairVerdict) -> bool:
+        return abs(pair.stamp_s - self._contrast_s) <= _SAME_PAIR_S
+
+    def _heeds_contrast(self, now_s: float) -> bool:
+        if self._p.contrast == "when_seen":
+            return now_s - self._contrast_s <= _SEEN_AGE_S
+        return self._p.contrast == "required"
+
+    def _contrast_against(self, stamp_s: float, now_s: float, limit: float) -> str:
+        """Return what the contrast has against `verged`; empty if nothing."""
+        if not self._heeds_contrast(now_s):
+            return ""
         if now_s - self._contrast_s > _SEEN_AGE_S:
-            if self._p.contrast == "when_seen":
-                return True, ""
-            return False, "no edge contrast arrives"
+            return "no edge contrast arrives"
         if stamp_s - self._contrast_s > _PAIR_MATCH_S + (_CONTRAST_AGE_S if self.verged else 0.0):
-            return False, "the edge contrast is older than the disparity"
-        limit = self._p.contrast_leave if self.verged else self._p.contrast_enter
+            return "the edge contrast is older than the disparity"
         if self.edge_verged or self.contrast <= limit:
-            return True, ""
-        return False, f"contrast {self.contrast:.2f} above {limit:.2f}"
+            return ""
+        return f"contrast {self.contrast:.2f} above {limit:.2f}"

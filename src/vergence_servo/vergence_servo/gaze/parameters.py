@@ -95,6 +95,12 @@ class GazeParameters(Parameters):
         0.0155, "error above which they no longer are", unit="rad", minimum=1e-4, maximum=0.2
     )
     verged_pairs: int = parameter(2, "pairs in a row that must say verged", minimum=1, maximum=100)
+    verged_doubt: float = parameter(
+        0.002,
+        "probability that the eyes are off after all, up to which one pair suffices; 0: never",
+        minimum=0,
+        maximum=1,
+    )
     unverged_pairs: int = parameter(4, "pairs in a row that must say not verged any more", minimum=1, maximum=100)
 
     lost_after_s: float = parameter(

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from vergence_rig.rig import Rig
 from vergence_servo.gaze.distance import UNKNOWN, TargetPosition, joint_variances, target_position
+from vergence_servo.gaze.evidence import Belief, doubt
 from vergence_servo.gaze.joint_history import JointHistory
 from vergence_servo.gaze.joint_moves import JointMoves
 from vergence_servo.gaze.judge import VergedJudge
@@ -36,6 +37,7 @@ _SWEEPING_RAD_S = 0.6
 _STILL_SPEED_RAD_S = 0.2
 _ARRIVED_RAD = 0.004
 _COMMANDED_AHEAD_S = 0.03
+_NOTHING_KNOWN = Belief(0.0, math.inf)
 
 
 class Perception:
@@ -47,6 +49,7 @@ class Perception:
         self.image_s = -math.inf
         self.pair_s = math.nan
         self.contrast: Contrast | None = None
+        self._foretold, self._foretold_s = _NOTHING_KNOWN, math.nan
         self._set_servos(rig)
         self.set(parameters, driven)
 
@@ -92,6 +95,7 @@ class Perception:
         if isinstance(observation, EdgeJudgement):
             self._see_contrast(observation, now_s, law, verging)
             return
+        self._foretell(observation.stamp_s)
         try:
             believed = self._see(observation, now_s)
         except SightingError as error:
@@ -153,7 +157,7 @@ class Perception:
             self.vergence_offset.see(seen.stamp_s, seen.vergence_rad - float(right - left), seen.sigma_rad)
 
     def _see_contrast(self, seen: EdgeJudgement, now_s: float, law: Law, verging: bool) -> None:
-        self.judge.see_contrast(seen.stamp_s, seen.contrast, seen.verged)
+        self.judge.see_contrast(seen.stamp_s, seen.contrast, seen.verged, now_s)
         if not (math.isfinite(seen.stamp_s) and self.history.covers(seen.stamp_s)):
             return
         if self.contrast is not None and seen.stamp_s <= self.contrast.stamp_s:
@@ -163,6 +167,18 @@ class Perception:
         self.contrast = Contrast(seen.stamp_s, seen.contrast, seen.metric_px, float(joints[1] - joints[0]), resting)
         if law.unsigned and resting and self.tracking.filter.initialised:
             self.judge.see_pair(seen.stamp_s, now_s, law.remaining_rad(), True, verging)
+
+    def _foretell(self, stamp_s: float) -> None:
+        """Keep the vergence error that is to be expected in a pair, before anything of it is looked at."""
+        if stamp_s == self._foretold_s:
+            return
+        self._foretold_s, self._foretold = stamp_s, _NOTHING_KNOWN
+        estimate = self.tracking.estimate(stamp_s)
+        if estimate is None:
+            return
+        joints, moved = self.history.shaft_at(stamp_s), self._moves.variances_before(stamp_s)
+        sigma = math.sqrt(float(estimate.covariance[1, 1] + moved[0] + moved[1]))
+        self._foretold = Belief(estimate.vergence_rad - float(joints[1] - joints[0]), sigma)
 
     def _judge_pair(self, stamp_s: float, now_s: float, verging: bool) -> None:
         visual, by_point = self.tracking.visual, self.tracking.source == "point"
@@ -174,19 +190,23 @@ class Perception:
         joints = self.history.shaft_at(stamp_s)
         errors = estimate.joints_rad - joints if by_point else visual.error_rad
         # With an eye held there is no version to correct: what is left is vergence, and the tilt.
-        judged = range(3) if self._driven[:2].all() else (2,)
-        measured = [abs(float(errors[i])) for i in judged if self._driven[i]]
+        judged = [i for i in (range(3) if self._driven[:2].all() else (2,)) if self._driven[i]]
+        measured = [abs(float(errors[i])) for i in judged]
         vergence_error = estimate.vergence_rad - float(joints[1] - joints[0])
         error = max([abs(vergence_error), *(value for value in measured if math.isfinite(value))])
         # Eyes that sweep across the target are not verged on it; eyes that go along with it are.
         along = float(np.abs(estimate.rates_rad_s).max()) if estimate.moving else 0.0
-        sweeping = self.history.speed_within(stamp_s - 0.03, stamp_s) > along + _SWEEPING_RAD_S
+        sweeping = self.history.speed_within(stamp_s - self._p.settle_s, stamp_s) > along + _SWEEPING_RAD_S
         certain = float(estimate.sigmas_rad[1]) < _STEADY_VERGENCE_RAD
-        present = self._present_error_rad(now_s)
         # What passed over the target when the pair was exposed is elsewhere by now.
-        there = present <= min(self._p.verged_enter_rad + self._unresolved_rad, self._p.verged_leave_rad)
+        there = self._present_error_rad(now_s) <= self.judge.enter_rad
         steady = certain and there and not sweeping and not self.tracking.doubtful
-        self.judge.see_pair(stamp_s, now_s, error, steady, verging)
+        left = 1.0
+        if not by_point and math.isfinite(visual.error_rad[1]):
+            limit, off, sigmas = self._p.verged_leave_rad, estimate.joints_rad - joints, estimate.joint_sigmas_rad
+            left = doubt(self._foretold, Belief(vergence_error, float(estimate.sigmas_rad[1])), limit)
+            left += sum(Belief(float(off[i]), float(sigmas[i])).beyond(limit) for i in judged)
+        self.judge.see_pair(stamp_s, now_s, error, steady, verging, left)
 
     def _present_error_rad(self, now_s: float) -> float:
         """Return how far the eyes, as they stand by now, are from the target as it is predicted."""
