@@ -1,7 +1,7 @@
 """The network: a small one-stage, anchor-free detector with heads of their own for class and box at strides 8 and 16.
 
 Convolution, batch normalisation and ReLU throughout, cross-stage-partial blocks, a top-down path; sized so that one
-320x240 image takes about 2.2 ms on one thread of a processor.
+320x240 image takes about 2 ms on one thread of a processor.
 """
 
 from dataclasses import dataclass

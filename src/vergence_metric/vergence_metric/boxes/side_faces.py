@@ -15,7 +15,7 @@ from vergence_metric.boxes.dense_matching import DenseMatch, DenseView
 from vergence_metric.boxes.detections import Box
 
 _MATCHED = 0.6  # of a column's pixels: the face that could be matched has begun
-_BARE = 0.55  # of the pixels outside it unmatched: a turned object's corners are not a face
+_BARE = 0.5  # of the pixels outside it unmatched: a turned object's corners are not a face
 _LEAST_SHARE = 0.05  # of the box's width: less changes nothing
 _LEAST_SEEN_PX = 2.0  # by the other eye: else that may not see the face at all
 _BESIDE = 3  # columns that tell the disparity where matching begins
@@ -71,4 +71,6 @@ def _strip(view: DenseView, near: NDArray[np.bool_], at_right: bool) -> _Strip:
     first = int(poor[-1]) + 1 if poor.size else 0
     beside = np.ix_(rows, columns[first : first + _BESIDE])
     known = view.disparity_px[beside][near[beside]]
-    return _Strip(columns[:first], ~found[:, :first], float(np.median(known)) if known.size else math.nan)
+    # Rows in which nothing is matched beside the face are above or below it: a turned object's corners.
+    level = found[:, first : first + _BESIDE].any(1)
+    return _Strip(columns[:first], ~found[level, :first], float(np.median(known)) if known.size else math.nan)
