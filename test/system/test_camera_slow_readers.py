@@ -17,10 +17,12 @@ import pytest
 
 from vergence_bringup.processes import NodeCommand, config_dir
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.system, pytest.mark.timeout(1800)]
 
-PATIENCE_S = 90.0
+PATIENCE_S = 300.0
 RATE_HZ, STILL_FRAMES = 30.0, 60
+# A camera that waits for a reader does so for 0.1 s at least: as long as a write may block, or a frame takes below.
+WAITING_S = 0.05
 # Prints the stamp [s] of every frame.
 READER = """
 import rclpy
@@ -110,19 +112,24 @@ def recording(tmp_path: Path) -> Path:
     return path
 
 
+def period_s(stamps_s: list[float]) -> float:
+    return (stamps_s[-1] - stamps_s[0]) / (len(stamps_s) - 1)
+
+
 def test_a_reader_that_stands_still_holds_up_nobody_and_then_catches_up(processes: Processes, recording: Path) -> None:
     lively, still = processes.reader(), processes.reader()
     processes.camera(recording)
+    before_s = lively.next_s(30)
     stopped_s = still.next_s()[0]
     os.kill(still.process.pid, signal.SIGSTOP)
-    lively_s = [0.0]
+    lively_s = lively.next_s()
     while lively_s[-1] < stopped_s + STILL_FRAMES / RATE_HZ:
         lively_s += lively.next_s()
     os.kill(still.process.pid, signal.SIGCONT)
     still_s = [stopped_s]
     while still_s[-1] <= lively_s[-1] and len(still_s) < 4 * STILL_FRAMES:
         still_s += still.next_s()
-    assert np.median(np.diff(lively_s[1:])) < 3.0 / RATE_HZ
+    assert period_s(lively_s) < WAITING_S + 3.0 * period_s(before_s)
     assert still_s[-1] > lively_s[-1], "it goes on with old frames"
     assert all(np.diff(still_s) > 0.0)
 
@@ -139,15 +146,16 @@ def test_a_slow_network_holds_up_neither_the_camera_nor_the_readers_beside_it(
         pytest.skip(f"this machine gives no slow network: {error}")
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
     laptop, pi = (("ip", "netns", "exec", namespace) for namespace in (cable.laptop, cable.pi))
-    beside, far = processes.reader(*laptop), processes.reader(*pi)
+    beside = processes.reader(*laptop)
     processes.camera(recording, *laptop)
+    before_s = beside.next_s(30)
+    far = processes.reader(*pi)
     far_s = far.next_s(2)
     beside_s = [0.0]
     while beside_s[-1] < far_s[-1]:  # what came before the far one was there
         beside_s += beside.next_s()
     beside_s = beside.next_s(60)
     far_s += far.next_s(3)
-    assert np.median(np.diff(beside_s)) < 3.0 / RATE_HZ
-    assert beside_s[-1] - beside_s[0] < 15.0
+    assert period_s(beside_s) < WAITING_S + 3.0 * period_s(before_s)
     assert all(np.diff(far_s) > 0.0)
     assert max(np.diff(far_s)) > 3.0 / RATE_HZ, "the cable was not slow"
