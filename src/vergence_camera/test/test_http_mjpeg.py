@@ -7,8 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from vergence_camera.errors import (
     CameraError,
@@ -22,7 +20,6 @@ from vergence_camera.errors import (
 from vergence_camera.frame import Frame, ModeRequest
 from vergence_camera.sources.http_client import shown_url
 from vergence_camera.sources.http_mjpeg import HttpMjpegSource
-from vergence_camera.sources.multipart import MultipartParser, boundary_of
 
 Make = Callable[..., bytes]
 Serve = Callable[[Callable[[Any], None]], Any]
@@ -268,37 +265,3 @@ def test_redirects_and_passwords(http_server: Serve, make_jpeg: Make) -> None:
 )
 def test_addresses_are_shown_without_their_secrets(url: str, shown: str) -> None:
     assert shown_url(url) == shown
-
-
-@pytest.mark.parametrize(
-    ("content_type", "boundary"),
-    [
-        ("multipart/x-mixed-replace; boundary=frame", b"--frame"),
-        ('multipart/x-mixed-replace;boundary="a b"', b"--a b"),
-        ("Multipart/X-Mixed-Replace; charset=x; Boundary=--myboundary", b"--myboundary"),
-    ],
-)
-def test_boundaries_as_cameras_write_them(content_type: str, boundary: bytes) -> None:
-    assert boundary_of(content_type) == boundary
-
-
-@settings(deadline=None, max_examples=80)
-@given(st.lists(st.integers(1, 4000), min_size=1, max_size=60), st.booleans())
-def test_the_parser_does_not_care_how_the_bytes_are_sliced(make_jpeg: Make, slices: list[int], length: bool) -> None:
-    pictures = [make_jpeg(number, 48, 32) for number in range(4)]
-    stated = [f"Content-Length: {len(p)}\r\n".encode() if length else b"" for p in pictures]
-    stream = b"rubbish\r\n" + b"".join(
-        b"--b\r\nContent-Type: image/jpeg\r\n" + text + b"\r\n" + picture + b"\r\n"
-        for text, picture in zip(stated, pictures, strict=True)
-    )
-    parser = MultipartParser(b"--b")
-    parts, position, now_ns = [], 0, 0
-    while position < len(stream):
-        size = slices[now_ns % len(slices)]
-        now_ns += 1
-        parts += parser.feed(stream[position : position + size], now_ns)
-        position += size
-    assert [part.data for part in parts] == pictures
-    times = [part.time_ns for part in parts]
-    assert times == sorted(times)
-    assert times[0] > 0
