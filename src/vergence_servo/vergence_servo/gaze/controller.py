@@ -164,6 +164,8 @@ class GazeController:
         sent = self._limits.sent(wanted, self._command, now_s - self._command_s, self._seen.history.reported_rad)
         self._note_limits(wanted)
         self._command, self._command_s = sent, max(now_s, self._command_s)
+        if sending:
+            self._seen.history.commanded(now_s)
         self._watch_goal(now_s)
         return Command(sent if sending else None, self._report(now_s), self._goals.take_outcomes())
 
