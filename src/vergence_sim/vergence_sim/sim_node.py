@@ -4,8 +4,11 @@ import functools
 import threading
 from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
@@ -25,11 +28,16 @@ from vergence_sim.real_time import Event, Schedule
 from vergence_sim.sim_messages import camera_info, joint_state, true_boxes, true_vergence
 from vergence_sim.simulator import Simulator, TargetError
 
+Picture = npt.NDArray[np.uint8]
+
 EYES = ("left", "right")
 
 
 class SimNode(Node):
-    """One thread owns the simulator and its OpenGL context; callbacks only leave it notes."""
+    """One thread owns the simulator and its OpenGL context; callbacks only leave it notes.
+
+    A second one makes pictures of what was exposed, while the first goes on rendering.
+    """
 
     def __init__(self, **options: Any) -> None:
         super().__init__("sim_node", **options)
@@ -67,6 +75,7 @@ class SimNode(Node):
         diagnostics.add("cameras", self._report_cameras)
         diagnostics.add("commands", self._report_commands)
         # Starting as one thread, so that what cannot be rendered ends the node with its reason.
+        self._darkroom = ThreadPoolExecutor(1, "darkroom")
         self._thread = threading.Thread(target=self._run, name="simulation", daemon=True)
         self._thread.start()
         self._started.wait()
@@ -78,6 +87,7 @@ class SimNode(Node):
         """End the simulation."""
         self._stop.set()
         self._thread.join(timeout=5.0)
+        self._darkroom.shutdown()
 
     def _now_s(self) -> float:
         return float(self.get_clock().now().nanoseconds) * 1e-9
@@ -155,17 +165,17 @@ class SimNode(Node):
                 self._true_joints.publish(joint_state(stamp, simulator.true_joints()))
             return
         header = Header(stamp=stamp, frame_id=f"{event.eye}_camera_optical_frame")
-        picture = simulator.view(event.eye)
+        picture = self._darkroom.submit(simulator.expose(event.eye))
         info = camera_info(header, simulator.lenses[event.eye])
         schedule.publish(event.eye, event.due_s + simulator.parameters.latency_s, (header, picture, info))
         if event.eye == "left":
             self._publish_truth(stamp, simulator)
 
-    def _publish_image(self, eye: str, header: Header, picture: Any, info: CameraInfo) -> None:
+    def _publish_image(self, eye: str, header: Header, picture: "Future[Picture]", info: CameraInfo) -> None:
         if self._images[eye].get_subscription_count():
-            self._images[eye].publish(array_to_image(picture, header))
+            self._images[eye].publish(array_to_image(picture.result(), header))
         if self._jpegs[eye].get_subscription_count():
-            self._jpegs[eye].publish(array_to_compressed(picture, header))
+            self._jpegs[eye].publish(array_to_compressed(picture.result(), header))
         self._infos[eye].publish(info)
         self._published[eye] += 1
 

@@ -1,7 +1,7 @@
 """The simulator in lockstep, without ROS: command joints, advance the world, take pictures, ask for the truth."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -152,12 +152,19 @@ class Simulator:
 
     def view(self, eye: str) -> Image:
         """Return what one eye, "left" or "right", sees now: (h, w, 3) BGR uint8."""
+        return self.expose(eye)()
+
+    def expose(self, eye: str) -> Callable[[], Image]:
+        """Expose one eye now; what is returned makes the picture of it, on any thread, one after the other."""
         if self._renderer is None:
             raise ValueError("this simulator was made with render=False: it takes no pictures")
-        view = self._renderer.render(self._data, eye)
-        if self.parameters.exposure_s > 0:
-            view = smeared(view, self._motion_px(eye))
-        return self._sensors[eye].apply(self.lenses[eye].apply(view), self.parameters)
+        view, motion_px, parameters = self._renderer.render(self._data, eye), self._motion_px(eye), self.parameters
+
+        def develop() -> Image:
+            seen = smeared(view, motion_px) if parameters.exposure_s > 0 else view
+            return self._sensors[eye].apply(self.lenses[eye].apply(seen), parameters)
+
+        return develop
 
     def capture(self, skew_s: float | None = None) -> StereoFrame:
         """Return the next pair, the first of the two exposed now; its truth is that of the left exposure.
