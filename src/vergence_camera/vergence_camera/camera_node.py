@@ -55,7 +55,7 @@ class CameraNode(Node):
         self._wanted = (False, False, False)
         topics = ((CompressedImage, "image_raw/compressed"), (CameraInfo, "camera_info"), (Image, "image_raw"))
         self._publishers_of_frames = tuple(
-            qos.create_publisher(kind, topic, IMAGE_QOS, matched=self._on_matched) for kind, topic in topics
+            qos.create_publisher(kind, topic, IMAGE_QOS, matched=self._see_listeners) for kind, topic in topics
         )
         self._compressed, self._info, self._raw = self._publishers_of_frames
         self._calibration = NodeCalibration(self, settings.camera_info_url, settings.camera_name or eye or "camera")
@@ -122,7 +122,7 @@ class CameraNode(Node):
             self._partner.skew.own(stamp.ros_ns)
         self._health.published((stamp.age_ns + time.monotonic_ns() - began_ns) * 1e-9)
 
-    def _on_matched(self, _: object) -> None:
+    def _see_listeners(self, _: object = None) -> None:
         """See who listens, now that one came or went. To ask for every frame would cost as much as to send it."""
         self._wanted = tuple(publisher.get_subscription_count() > 0 for publisher in self._publishers_of_frames)
 
@@ -148,6 +148,7 @@ class CameraNode(Node):
         self._controls.configure(settings.lock, settings.lock_after_s)
 
     def _report(self) -> Report:
+        self._see_listeners()  # not every middleware tells
         state = self._health.snapshot()
         settings: CameraParameters = self._settings.value
         request = settings.source_options().request
