@@ -180,12 +180,13 @@ class TargetTracking(BelievedTarget):
             expected = self.filter.at(sighting.stamp_s)
             return self._rivals.may_be_the_target(sighting.stamp_s, seen, sighting.extent_rad, own_depth, expected)
 
+        unexpected_rad = abs(vergence - self.filter.at(sighting.stamp_s).vergence_rad)
         believed = self.believe(measurement, seen, sighting.skew_s, now_s, "box", may_jump)
         if believed:
             self._rivals.found(sighting.stamp_s, self.filter.at(sighting.stamp_s))
         if believed or not by_class:
             self._agreement.see_box(sighting.stamp_s, vergence, math.sqrt(2.0) * sigma, own_depth)
-            self._heed_boxes(sighting.stamp_s)
+            self._heed_boxes(sighting.stamp_s, unexpected_rad)
         return believed
 
     def _contains_target(self, sighting: BoxSighting, seen_rad: Array, own_depth_rad: float) -> bool:
@@ -198,8 +199,8 @@ class TargetTracking(BelievedTarget):
             bound = self._p.disagreement_rad + own_depth_rad + 4.0 * float(estimate.sigmas_rad[1])
         return self._boxes.adopt(seen_rad, sighting.extent_rad, bound, estimate)
 
-    def _heed_boxes(self, stamp_s: float) -> None:
-        """Let go of what the boxes say is not the target."""
+    def _heed_boxes(self, stamp_s: float, unexpected_rad: float) -> None:
+        """Let go of what the boxes, whose depth differs so far from the estimate's, say is not the target."""
         astray = self._agreement.fovea_is_astray(stamp_s)
         # What they told before is in the estimate: the boxes may now move it.
         off_rad = self._agreement.fovea_off_rad if astray and not self._fovea_was_astray else 0.0
@@ -207,8 +208,8 @@ class TargetTracking(BelievedTarget):
             off_rad = self._agreement.track_off_rad
             self._track.refuse()
             self._agreement.drop_track()
-        if off_rad:
-            self.filter.loosen(np.array([0.5, 0.5, 0.0]) * off_rad**2)
+        if off_rad and math.isfinite(unexpected_rad):
+            self.filter.loosen(np.array([0.5, 0.5, 0.0]) * min(abs(off_rad), unexpected_rad) ** 2)
         self._fovea_was_astray = astray
 
     def see_point(self, sighting: PointSighting, now_s: float) -> bool:
