@@ -60,7 +60,7 @@ def test_a_second_sighting_of_a_pair_replaces_what_the_first_said() -> None:
     judging = judge()
     judging.see_contrast(1.0, GOOD, False, 1.06)
     judging.see_pair(1.0, 1.06, SMALL_RAD, True, True, 0.05)
-    judging.see_pair(1.0, 1.06, 0.5, True, True, 0.05)  # the box shows how far the direction is off
+    judging.see_pair(1.0, 1.06, SMALL_RAD, True, True, 0.05, 0.5)  # the box shows how far the direction is off
     judging.see_contrast(1.0 + FRAME_S, GOOD, False, 1.1)
     assert not judging.see_pair(1.0 + FRAME_S, 1.1, SMALL_RAD, True, True, 0.05)
 
@@ -79,6 +79,18 @@ def test_certainty_of_one_pair_is_no_substitute_for_rest(missing: str) -> None:
         stamp_s = 1.0 + i * FRAME_S
         judging.see_contrast(stamp_s, GOOD, False, stamp_s + 0.06)
         assert not judging.see_pair(stamp_s, stamp_s + 0.06, SMALL_RAD, missing != "steady", missing != "resting", SURE)
+
+
+@pytest.mark.parametrize(
+    ("error_rad", "aside_rad", "verged"), [(0.0, 0.012, True), (0.012, 0.0, False), (0.0, 0.014, False)]
+)
+def test_a_direction_need_not_be_nearer_than_the_dead_band_but_vergence_must(
+    error_rad: float, aside_rad: float, verged: bool
+) -> None:
+    judging = judge()
+    judging.dead_band_rad = 0.013
+    judging.see_contrast(1.0, GOOD, False, 1.06)
+    assert judging.see_pair(1.0, 1.06, error_rad, True, True, SURE, aside_rad) is verged
 
 
 def test_losing_it_takes_several_pairs() -> None:

@@ -17,6 +17,7 @@ class PairVerdict:
 
     stamp_s: float
     error_rad: float
+    aside_rad: float
     steady: bool
     resting: bool
     doubt: float
@@ -38,6 +39,8 @@ class VergedJudge:
         self._good_before = 0
         self.unresolved_rad = 0.0
         """Error that the servos cannot mend, beyond what the limits were made for: it keeps nobody from `verged`."""
+        self.dead_band_rad = 0.0
+        """The servos' largest dead band: where in it an axis stops, no command decides."""
         self.contrast = math.nan
         self.edge_verged = False
         self.verged = False
@@ -53,8 +56,13 @@ class VergedJudge:
 
     @property
     def enter_rad(self) -> float:
-        """The largest error at which eyes become verged."""
+        """The largest vergence error at which eyes become verged."""
         return min(self._p.verged_enter_rad + self.unresolved_rad, self._p.verged_leave_rad)
+
+    @property
+    def aside_enter_rad(self) -> float:
+        """The largest error of a gaze direction at which eyes become verged."""
+        return max(self.enter_rad, min(self.dead_band_rad, self._p.verged_leave_rad))
 
     def see_contrast(self, stamp_s: float, contrast: float, edge_verged: bool, now_s: float) -> None:
         """Take the edge metric's judgement of a pair."""
@@ -74,23 +82,31 @@ class VergedJudge:
         return min(stamp_s, self._contrast_s) if counts else stamp_s
 
     def see_pair(
-        self, stamp_s: float, now_s: float, error_rad: float, steady: bool, resting: bool, doubt: float = 1.0
+        self,
+        stamp_s: float,
+        now_s: float,
+        error_rad: float,
+        steady: bool,
+        resting: bool,
+        doubt: float = 1.0,
+        aside_rad: float = 0.0,
     ) -> bool:
         """Judge one pair in which the target was measured; returns `verged`.
 
         Args:
             stamp_s: the pair's stamp; every pair counts once, by the last that is told of it until it is verged.
             now_s: the present.
-            error_rad: the larger of the vergence error and of the gaze directions' errors in that pair.
+            error_rad: the vergence error in that pair.
             steady: whether the estimate is certain enough.
             resting: whether the eyes were still enough in that pair to see.
             doubt: the probability that the eyes are off after all, for all that was known before and is seen now.
+            aside_rad: the largest error of a gaze direction in that pair.
         """
         if not stamp_s >= self._last_pair_s or (stamp_s == self._last_pair_s and (self.verged or self._pair is None)):
             return self.verged
         if stamp_s > self._last_pair_s:
             self._last_pair_s, self._good_before = stamp_s, self._good
-        self._pair = PairVerdict(stamp_s, error_rad, steady, resting, doubt)
+        self._pair = PairVerdict(stamp_s, error_rad, aside_rad, steady, resting, doubt)
         if self.verged:
             self._stay(self._pair, now_s)
         else:
@@ -98,7 +114,7 @@ class VergedJudge:
         return self.verged
 
     def _enter(self, pair: PairVerdict, now_s: float) -> None:
-        good = self._within(pair, now_s, self.enter_rad, self._p.contrast_enter)
+        good = self._within(pair, now_s, (self.enter_rad, self.aside_enter_rad), self._p.contrast_enter)
         if good and not (pair.steady and pair.resting):
             good, self.reason = False, "estimate not steady yet"
         self._good = self._good_before + 1 if good else 0
@@ -109,15 +125,16 @@ class VergedJudge:
             self.verged, self.since_s, self._bad = True, now_s, 0
 
     def _stay(self, pair: PairVerdict, now_s: float) -> None:
-        good = self._within(pair, now_s, self._p.verged_leave_rad, self._p.contrast_leave)
+        good = self._within(pair, now_s, (self._p.verged_leave_rad,) * 2, self._p.contrast_leave)
         self._bad = 0 if good else self._bad + 1
         if self._bad >= self._p.unverged_pairs:
             self.verged, self.since_s, self._good = False, math.nan, 0
 
-    def _within(self, pair: PairVerdict, now_s: float, limit_rad: float, contrast_limit: float) -> bool:
-        if not abs(pair.error_rad) <= limit_rad:
-            self.reason = f"error {math.degrees(abs(pair.error_rad)):.2f} deg"
-            return False
+    def _within(self, pair: PairVerdict, now_s: float, limits_rad: tuple[float, float], contrast_limit: float) -> bool:
+        for error_rad, limit_rad in zip((pair.error_rad, pair.aside_rad), limits_rad, strict=True):
+            if not abs(error_rad) <= limit_rad:
+                self.reason = f"error {math.degrees(abs(error_rad)):.2f} deg"
+                return False
         against = self._contrast_against(pair.stamp_s, now_s, contrast_limit)
         self.reason = against or "contrast, signed error and steadiness agree"
         return not against

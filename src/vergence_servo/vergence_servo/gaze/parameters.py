@@ -89,7 +89,11 @@ class GazeParameters(Parameters):
     contrast_enter: float = parameter(0.72, "contrast below which the eyes may be verged", minimum=0, maximum=2)
     contrast_leave: float = parameter(0.9, "contrast above which they no longer are", minimum=0, maximum=2)
     verged_enter_rad: float = parameter(
-        0.0085, "vergence and direction error below which the eyes may be verged", unit="rad", minimum=1e-4, maximum=0.2
+        0.0085,
+        "vergence error below which the eyes may be verged; directions: this or the servos' dead band",
+        unit="rad",
+        minimum=1e-4,
+        maximum=0.2,
     )
     verged_leave_rad: float = parameter(
         0.0155, "error above which they no longer are", unit="rad", minimum=1e-4, maximum=0.2

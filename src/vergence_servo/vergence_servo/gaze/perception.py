@@ -37,6 +37,7 @@ _SWEEPING_RAD_S = 0.6
 _STILL_SPEED_RAD_S = 0.2
 _ARRIVED_RAD = 0.004
 _COMMANDED_AHEAD_S = 0.03
+_DOUBT_OF_MOTION = 0.1
 _NOTHING_KNOWN = Belief(0.0, math.inf)
 
 
@@ -59,18 +60,19 @@ class Perception:
         self._moves = JointMoves(self._rig, self.history)
         self.tracking = TargetTracking(self._rig, parameters, self.history, self._moves)
         self.judge = VergedJudge(parameters)
-        self.judge.unresolved_rad = self._unresolved_rad
+        self.judge.unresolved_rad, self.judge.dead_band_rad = self._unresolved_rad, self._dead_band_rad
 
     def set_rig(self, rig: Rig) -> None:
         """Take a rig whose servos have other steps; target and goal stay."""
         self._set_servos(rig)
         self._moves.steps_rad = pulse_steps_rad(rig)
-        self.judge.unresolved_rad = self._unresolved_rad
+        self.judge.unresolved_rad, self.judge.dead_band_rad = self._unresolved_rad, self._dead_band_rad
 
     def _set_servos(self, rig: Rig) -> None:
         self._rig = rig
         self._shaft_variances = joint_variances(rig)
         self.vergence_offset = VergenceOffset(self._shaft_variances, farthest_offset_rad(rig))
+        self._dead_band_rad = max(joint.servo.dead_band_rad for _, joint in rig.joints.items())
         coarser = np.maximum(pulse_steps_rad(rig) - self._described_steps_rad, 0.0)
         self._unresolved_rad = 0.5 * float(coarser[0] + coarser[1])
 
@@ -193,27 +195,35 @@ class Perception:
         judged = [i for i in (range(3) if self._driven[:2].all() else (2,)) if self._driven[i]]
         measured = [abs(float(errors[i])) for i in judged]
         vergence_error = estimate.vergence_rad - float(joints[1] - joints[0])
-        error = max([abs(vergence_error), *(value for value in measured if math.isfinite(value))])
+        seen_error = 0.0 if by_point else float(visual.error_rad[1] - visual.error_rad[0])
+        error = max(abs(vergence_error), abs(seen_error) if math.isfinite(seen_error) else 0.0)
+        aside = max((value for value in measured if math.isfinite(value)), default=0.0)
         # Eyes that sweep across the target are not verged on it; eyes that go along with it are.
         along = float(np.abs(estimate.rates_rad_s).max()) if estimate.moving else 0.0
         sweeping = self.history.speed_within(stamp_s - self._p.settle_s, stamp_s) > along + _SWEEPING_RAD_S
         certain = float(estimate.sigmas_rad[1]) < _STEADY_VERGENCE_RAD
         # What passed over the target when the pair was exposed is elsewhere by now.
-        there = self._present_error_rad(now_s) <= self.judge.enter_rad
+        there = self._is_there(now_s)
         steady = certain and there and not sweeping and not self.tracking.doubtful
         left = 1.0
-        if not by_point and math.isfinite(visual.error_rad[1]):
+        # What moves, or may move, can be elsewhere by now: there one pair is never enough.
+        if self.tracking.filter.surely_rests and not by_point and math.isfinite(visual.error_rad[1]):
             limit, off, sigmas = self._p.verged_leave_rad, estimate.joints_rad - joints, estimate.joint_sigmas_rad
             left = doubt(self._foretold, Belief(vergence_error, float(estimate.sigmas_rad[1])), limit)
             left += sum(Belief(float(off[i]), float(sigmas[i])).beyond(limit) for i in judged)
-        self.judge.see_pair(stamp_s, now_s, error, steady, verging, left)
+        self.judge.see_pair(stamp_s, now_s, error, steady, verging, left, aside)
 
-    def _present_error_rad(self, now_s: float) -> float:
-        """Return how far the eyes, as they stand by now, are from the target as it is predicted."""
+    def _is_there(self, now_s: float) -> bool:
+        """Tell whether the eyes, as they stand by now, are on the target as it is predicted, as far as that is sure."""
         estimate, joints = self.tracking.estimate(now_s), self.history.shaft_rad
         if estimate is None:
-            return math.inf
-        off = np.abs(estimate.joints_rad - joints)
+            return False
+        off, sigmas = estimate.joints_rad - joints, estimate.joint_sigmas_rad
         judged = self._driven if self._driven[:2].all() else self._driven & np.array([False, False, True])
         vergence = abs(estimate.vergence_rad - float(joints[1] - joints[0]))
-        return max(vergence, float(off[judged].max(initial=0.0)))
+        aside = float(np.abs(off[judged]).max(initial=0.0))
+        if vergence > self.judge.enter_rad or aside > self.judge.aside_enter_rad:
+            return False
+        limit = self._p.verged_leave_rad
+        beyond = sum(Belief(float(off[i]), float(sigmas[i])).beyond(limit) for i in np.flatnonzero(judged))
+        return not estimate.moving or beyond < _DOUBT_OF_MOTION

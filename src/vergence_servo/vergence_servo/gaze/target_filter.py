@@ -116,6 +116,11 @@ class TargetFilter:
         """True while the target is believed to move."""
         return self._moving
 
+    @property
+    def surely_rests(self) -> bool:
+        """True while what was seen speaks for a target at rest, not only not yet for one in motion."""
+        return not self._moving and self._evidence < _EVIDENCE_TO_REST
+
     def start(self, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
         """Begin anew with a target at these angles (3,) with this covariance (3, 3), of unknown speed."""
         state, whole = np.zeros(6), np.zeros((6, 6))
