@@ -29,6 +29,9 @@ _SLOW_RAD_S = 0.03
 _FADE_S = 0.4
 _STALE_S = 0.3
 _FARTHEST_RAD = 0.06
+_SEEN_SHARE = 0.3
+_JUMP_RAD_S = 0.7
+_BESIDE_RAD_S = math.radians(4.0)
 
 
 class PidPursuitLaw:
@@ -47,7 +50,7 @@ class PidPursuitLaw:
         """Forget the speed and where the target was."""
         self._inverse.reset()
         self._aim = np.full(3, np.nan)
-        self._speed = np.zeros(3)
+        self._speed, self._seen_speed = np.zeros(3), np.zeros(3)
         self._place = np.full(3, np.nan)
         self._errors = self._slope = np.zeros(3)
         self._stamp_s = -math.inf
@@ -96,12 +99,19 @@ class PidPursuitLaw:
             off = np.nan_to_num(seen + self._speed * (view.now_s - visual.stamp_s) - _axes(view.shaft_rad))
             self._slope = (off - self._errors) / interval_s
             learns = (np.abs(errors) < _INTEGRATED_RAD) & (np.abs(off) < _INTEGRATED_RAD)
-            self._speed = np.clip(
-                self._speed + np.where(learns, _INTEGRAL * off * interval_s, 0.0), -_FASTEST_RAD_S, _FASTEST_RAD_S
+            surprise = np.nan_to_num(seen - self._place) / interval_s - self._seen_speed
+            self._seen_speed = self._seen_speed + np.where(np.abs(surprise) < _JUMP_RAD_S, _SEEN_SHARE * surprise, 0.0)
+            # On the way to a target at rest the integral would take its own error for the target's speed.
+            speed = np.clip(
+                self._speed + np.where(learns, _INTEGRAL * off * interval_s, 0.0),
+                self._seen_speed - _BESIDE_RAD_S,
+                self._seen_speed + _BESIDE_RAD_S,
             )
+            self._speed = np.clip(speed, -_FASTEST_RAD_S, _FASTEST_RAD_S)
             self._errors = off
         else:
             self._speed, self._slope, self._errors = np.zeros(3), np.zeros(3), np.zeros(3)
+            self._seen_speed = np.zeros(3)
         self._place = np.where(np.isfinite(seen), seen, self._place + self._speed * min(interval_s, _STALE_S))
         self._stamp_s = visual.stamp_s
 
