@@ -122,7 +122,7 @@ def measure(commands: Sequence[Sequence[str]], file: Path, duration_s: float = _
     A frame is lost if its picture of `file` never comes although later ones do; that cannot be told of pictures that
     were encoded anew (NaN).
     """
-    numbers = {picture: number for number, picture in enumerate(AviRecording(file).pictures())}
+    numbers = {bytes(picture): number for number, picture in enumerate(AviRecording(file).pictures())}
     with own_domain() as domain, contextlib.ExitStack() as stack:
         context = Context()
         rclpy.init(args=[], context=context, domain_id=domain)
