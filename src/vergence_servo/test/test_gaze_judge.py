@@ -18,8 +18,8 @@ GOOD, BAD = 0.4, 0.95
 FRAME_S = 1.0 / 30.0
 
 
-def judge(**changed: object) -> VergedJudge:
-    return VergedJudge(GazeParameters(**changed))
+def judge(verged_doubt: float = GazeParameters().verged_doubt) -> VergedJudge:
+    return VergedJudge(GazeParameters(verged_doubt=verged_doubt))
 
 
 def test_one_pair_without_doubt_and_with_its_own_contrast_suffices() -> None:
