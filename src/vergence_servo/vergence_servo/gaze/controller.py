@@ -19,7 +19,7 @@ from vergence_servo.gaze.observations import JointResolution, Observation, Point
 from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.perception import LATEST_FUTURE_S, Perception
 from vergence_servo.gaze.phases import Phase, PhaseMachine, Situation
-from vergence_servo.gaze.report import Command, GazeReport, disparity_px, fixation_of_joints, residual_of
+from vergence_servo.gaze.report import Command, GazeReport, report_of
 from vergence_servo.gaze.resolution import pulse_steps_rad, rig_with_steps
 from vergence_servo.gaze.search_pattern import Searcher
 from vergence_servo.gaze.vergence_offset import VergenceOffset
@@ -298,32 +298,7 @@ class GazeController:
         self._phases.enter(Phase.IDLE, reason, now_s)
 
     def _report(self, now_s: float) -> GazeReport:
-        known = self._seen.history.known and math.isfinite(now_s)
-        joints = self._seen.history.shaft_rad if known else _UNKNOWN
-        estimate = self._seen.tracking.estimate(now_s) if known else None
-        residual = residual_of(estimate, joints)
-        fixation, miss = fixation_of_joints(joints, self._rig.baseline_m)
-        reason = self._phases.reason if known else "no joint_states have arrived"
-        if self._phases.phase is Phase.VERGE and not self._seen.judge.verged:
-            reason = f"{reason}; {self._seen.tracking.note or self._seen.judge.reason}"
-        return GazeReport(
-            stamp_s=self._seen.pair_s if math.isfinite(self._seen.pair_s) else now_s,
-            phase=self._phases.phase,
-            reason=reason,
-            law=self._law.name,
-            mode=self._p.mode,
-            verged=self._seen.judge.verged,
-            target_moving=self._seen.tracking.filter.moving,
-            version_rad=0.5 * float(joints[0] + joints[1]),
-            vergence_rad=float(joints[1] - joints[0]),
-            tilt_rad=float(joints[2]),
-            residual_rad=residual,
-            residual_px=disparity_px(residual[1], self._rig.left_camera.fx_px),
-            contrast=self._seen.judge.contrast,
-            target=self._seen.position(estimate),
-            fixation_m=fixation,
-            miss_distance_m=miss,
-        )
+        return report_of(now_s, self._seen, self._phases, self._law.name, self._p.mode, self._rig)
 
 
 def _driven(parameters: GazeParameters) -> npt.NDArray[np.bool_]:

@@ -7,9 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.geometry import GeometryError, eye_direction, eye_position, fixation_of_rays
+from vergence_rig.rig import Rig
 from vergence_servo.gaze.distance import TargetPosition
 from vergence_servo.gaze.goals import Outcome
-from vergence_servo.gaze.phases import Phase
+from vergence_servo.gaze.perception import Perception
+from vergence_servo.gaze.phases import Phase, PhaseMachine
 from vergence_servo.gaze.target_filter import TargetEstimate
 
 Array = npt.NDArray[np.float64]
@@ -47,6 +49,36 @@ class Command:
     joints_rad: Array | None
     report: GazeReport
     outcomes: tuple[Outcome, ...]
+
+
+def report_of(now_s: float, seen: Perception, phases: PhaseMachine, law: str, mode: str, rig: Rig) -> GazeReport:
+    """Return what is known at `now_s`, and what is done about it by which law and mode."""
+    known = seen.history.known and math.isfinite(now_s)
+    joints = seen.history.shaft_rad if known else np.full(3, math.nan)
+    estimate = seen.tracking.estimate(now_s) if known else None
+    residual = residual_of(estimate, joints)
+    fixation, miss = fixation_of_joints(joints, rig.baseline_m)
+    reason = phases.reason if known else "no joint_states have arrived"
+    if phases.phase is Phase.VERGE and not seen.judge.verged:
+        reason = f"{reason}; {seen.tracking.note or seen.judge.reason}"
+    return GazeReport(
+        stamp_s=seen.pair_s if math.isfinite(seen.pair_s) else now_s,
+        phase=phases.phase,
+        reason=reason,
+        law=law,
+        mode=mode,
+        verged=seen.judge.verged,
+        target_moving=seen.tracking.filter.moving,
+        version_rad=0.5 * float(joints[0] + joints[1]),
+        vergence_rad=float(joints[1] - joints[0]),
+        tilt_rad=float(joints[2]),
+        residual_rad=residual,
+        residual_px=disparity_px(residual[1], rig.left_camera.fx_px),
+        contrast=seen.judge.contrast,
+        target=seen.position(estimate),
+        fixation_m=fixation,
+        miss_distance_m=miss,
+    )
 
 
 def residual_of(estimate: TargetEstimate | None, joints_rad: Array) -> tuple[float, float, float]:
