@@ -195,7 +195,9 @@ class Perception:
         judged = [i for i in (range(3) if self._driven[:2].all() else (2,)) if self._driven[i]]
         measured = [abs(float(errors[i])) for i in judged]
         vergence_error = estimate.vergence_rad - float(joints[1] - joints[0])
-        seen_error = 0.0 if by_point else float(visual.error_rad[1] - visual.error_rad[0])
+        # The fovea's vergence is told from the left eye's own axis, wherever the target is beside it.
+        left_error = 0.0 if self.tracking.source == "fovea" else visual.error_rad[0]
+        seen_error = 0.0 if by_point else float(visual.error_rad[1] - left_error)
         error = max(abs(vergence_error), abs(seen_error) if math.isfinite(seen_error) else 0.0)
         aside = max((value for value in measured if math.isfinite(value)), default=0.0)
         # Eyes that sweep across the target are not verged on it; eyes that go along with it are.
