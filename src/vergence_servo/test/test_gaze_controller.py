@@ -113,6 +113,18 @@ def test_a_held_eye_does_not_turn(mode: str, held: int) -> None:
     assert abs(run.errors_deg[-1][1]) < 0.1
 
 
+def test_a_target_beside_the_held_axis_is_verged_on_by_the_fovea_alone() -> None:
+    azimuth = math.radians(0.7)
+    place = fixed(0.6 * math.cos(azimuth), 0.5 * default_rig().baseline_m + 0.6 * math.sin(azimuth), 0.0)
+    parameters = GazeParameters(mode="left_held", tilt_enabled=False)
+    run = Run(
+        rig_with(SG90), place, parameters, seeing=Seeing(track=False, noise_px=0.1), start_rad={"pan_right": 0.05}
+    )
+    run.click()
+    run.until(1.5)
+    assert [outcome.result for outcome in run.outcomes] == [Result.VERGED], run.report.reason
+
+
 def test_a_moving_target_is_followed() -> None:
     def ramp(time_s: float) -> np.ndarray:
         azimuth = math.radians(-10.0 + 20.0 * max(min(time_s, 2.5) - 1.0, 0.0))
