@@ -144,14 +144,14 @@ class BoxMetricNodeParameters(BoxMetricParameters, DetectorParameters, StereoPar
 
     enable: bool = parameter(True, "whether pairs are measured at all")
     rate_hz: float = parameter(
-        12.0,
+        10.5,
         "pairs measured a second at most, so that the rest of the graph keeps its cores",
         unit="Hz",
         minimum=0.1,
         maximum=240.0,
     )
     niceness: int = parameter(
-        10,
+        15,
         "how far detection gives way to other nodes that want the same core, as nice(1) means it",
         minimum=0,
         maximum=19,
