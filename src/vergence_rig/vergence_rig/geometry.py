@@ -173,13 +173,13 @@ def nearest_points_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direc
     a, b = np.asarray(origin_a, dtype=np.float64), np.asarray(origin_b, dtype=np.float64)
     u = np.asarray(direction_a, dtype=np.float64) / np.linalg.norm(direction_a)
     v = np.asarray(direction_b, dtype=np.float64) / np.linalg.norm(direction_b)
-    normal = np.cross(u, v)
+    normal = _cross(u, v)
     sine_square = float(normal @ normal)
     if sine_square < _PARALLEL_RAD**2:
         raise ParallelAxesError(f"the rays are parallel to {math.sqrt(sine_square):.1e} rad: they meet at infinity")
     offset = b - a
-    along_a = float(np.cross(offset, v) @ normal) / sine_square
-    along_b = float(np.cross(offset, u) @ normal) / sine_square
+    along_a = float(_cross(offset, v) @ normal) / sine_square
+    along_b = float(_cross(offset, u) @ normal) / sine_square
     if along_a <= 0 or along_b <= 0:
         raise DivergingAxesError("the rays diverge: their closest approach is behind an eye")
     return a + along_a * u, b + along_b * v
@@ -214,3 +214,9 @@ def _check_converging(vergence_rad: float) -> None:
         raise ParallelAxesError(f"vergence is {vergence_rad:.1e} rad: the axes are parallel and meet at infinity")
     if vergence_rad < 0:
         raise DivergingAxesError(f"vergence is {vergence_rad:g} rad: the axes diverge")
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Return the cross product (3,) of two vectors (3,): np.cross is slow for single ones."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

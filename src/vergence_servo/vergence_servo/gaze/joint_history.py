@@ -133,6 +133,8 @@ class JointHistory:
             return self._reported[min(i, len(self._stamps) - 1)], i
         begin_s, end_s = self._stamps[i - 1], self._stamps[i]
         before, after = self._reported[i - 1], self._reported[i]
+        if not (before != after).any():
+            return before, i
         onset_s = self._onset_s(begin_s, end_s)
         if onset_s is None:
             return before + (stamp_s - begin_s) / (end_s - begin_s) * (after - before), i
