@@ -23,6 +23,7 @@ from vergence_rig.rig import Rig
 # The target point must end inside the 50 px fovea of both eyes.
 _FOVEA_HALF_PX = 25.0
 _LIMIT_S = 12.0
+_GO_ALONG_S = 1.0
 _SETTLE_S = 0.7
 _OUT_OF_SIGHT_M = (10.0, 0.0, -10.0)
 
@@ -88,6 +89,8 @@ class StationRunner:
         reason = "" if result.result == LookAt.Result.VERGED else result.reason
         if station.moving:
             recorder.set_parameters("sim_node", dict(station.motion), self._alive)
+            # It starts at full speed: the eyes get a second to go along before they have to stay on it.
+            recorder.settle(_GO_ALONG_S, self._alive)
         recorder.settle(station.hold_s, self._alive)
         after = recorder.picture(station.has_boxes, self._alive)
         self._store(station, "end", after)
