@@ -11,19 +11,41 @@ from vergence_rig.geometry import EyeAngles
 FRAME_S = 1 / 30
 
 
-@pytest.mark.parametrize(("turn_deg", "saccade"), [(3.9, False), (4.2, True)])
-def test_a_saccade_is_more_than_four_degrees_in_a_tenth_of_a_second(turn_deg, saccade):
+def turned_over(frames, turn_deg, frame_s=FRAME_S):
+    """Return a watch that has seen a turn of this size over this many frames, the state then, and the stamp."""
     watch = EyeWatch(TrackerParameters())
-    for k in range(10):
-        watch.update(k * FRAME_S, EyeAngles(0.0, 0.0, 0.0))
-    for k in range(3):
-        state = watch.update((10 + k) * FRAME_S, EyeAngles(math.radians(turn_deg * (k + 1) / 3), 0.0, 0.0))
+    stamp_s = 0.0
+    for _ in range(10):
+        watch.update(stamp_s, EyeAngles(0.0, 0.0, 0.0))
+        stamp_s += frame_s
+    for k in range(frames):
+        state = watch.update(stamp_s, EyeAngles(math.radians(turn_deg * (k + 1) / frames), 0.0, 0.0))
+        stamp_s += frame_s
+    return watch, state, stamp_s
+
+
+@pytest.mark.parametrize(("turn_deg", "saccade"), [(2.4, False), (2.6, True)])
+@pytest.mark.parametrize("frames", [1, 2])
+def test_a_saccade_is_more_than_two_and_a_half_degrees_in_two_frames(turn_deg, saccade, frames):
+    watch, state, stamp_s = turned_over(frames, turn_deg)
     assert state.saccading is saccade
     assert state.rested_s == 0.0
     for k in range(4):
-        state = watch.update((13 + k) * FRAME_S, EyeAngles(math.radians(turn_deg), 0.0, 0.0))
+        state = watch.update(stamp_s + k * FRAME_S, EyeAngles(math.radians(turn_deg), 0.0, 0.0))
     assert not state.saccading
     assert state.rested_s == pytest.approx(4 * FRAME_S)
+
+
+def test_pursuit_at_30_degrees_a_second_is_no_saccade():
+    watch = EyeWatch(TrackerParameters())
+    for k in range(60):
+        assert not watch.update(k * FRAME_S, EyeAngles(math.radians(30.0 * k * FRAME_S), 0.0, 0.0)).saccading
+
+
+@pytest.mark.parametrize(("turn_deg", "saccade"), [(3.4, False), (3.7, True)])
+def test_frames_that_come_late_are_held_against_the_same_speed(turn_deg, saccade):
+    _, state, _ = turned_over(1, turn_deg, frame_s=0.1)
+    assert state.saccading is saccade
 
 
 @pytest.mark.parametrize("turned", [(0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)])

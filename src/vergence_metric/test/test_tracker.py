@@ -184,7 +184,7 @@ def test_joints_that_were_wrong_once_do_not_send_it_away(stage, moves_m):
     step = np.array([0.0, moves_m, 0.0])
     for _ in range(8):
         stage.show(place := place + step, eyes)
-    wrong = EyeAngles(eyes.pan_left_rad + 0.05, eyes.pan_right_rad + 0.05, 0.0)
+    wrong = EyeAngles(eyes.pan_left_rad + 0.04, eyes.pan_right_rad + 0.04, 0.0)
     stage.show(place := place + step, eyes, told=wrong)
     for _ in range(12):
         stage.show(place := place + step, eyes, covered=("left", "right"))
@@ -235,6 +235,17 @@ def test_a_saccade_to_another_thing_locks_anew(stage):
     assert track.status is TrackStatus.OK
     assert track.track_id == first.track_id + 1
     assert np.abs(np.array(track.left_px) - pixel(other, True, goal)).max() < 3.0
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_a_small_saccade_to_another_thing_locks_anew(stage, hidden):
+    """A goal three degrees beside the old one: what was followed before is seen on, or hidden."""
+    target, other = (1.6, 0.04, 0.0), (1.0, -0.03, 0.0)
+    first = stage.lock(target, gaze(target))
+    for _ in range(12):
+        track = stage.show((5.0, -3.0, 0.0) if hidden else target, gaze(other), occluder_m=other)
+    assert (track.status, track.track_id) == (TrackStatus.OK, first.track_id + 1)
+    assert np.abs(np.array(track.left_px) - pixel(other, True, gaze(other))).max() < 3.0
 
 
 def test_a_saccade_towards_the_target_keeps_it(stage):

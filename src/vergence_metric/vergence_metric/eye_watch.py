@@ -35,9 +35,10 @@ class EyeWatch:
     def update(self, stamp_s: float, eyes: EyeAngles) -> EyeState:
         """Take the angles at a frame's stamp; stamps must increase."""
         p = self._parameters
-        # A little slack, so that frames 33 ms apart are still compared over the whole of 100 ms.
-        recent = [before for s, before in self._history if s >= stamp_s - p.track_saccade_s - 1e-3]
-        saccading = any(_turned_deg(before, eyes) > p.track_saccade_deg for before in recent)
+        saccading = any(
+            _turned_deg(before, eyes) > p.track_saccade_deg * max((stamp_s - s) / p.track_saccade_s, 1.0)
+            for s, before in self._history
+        )
         if self._history:
             before_s, before = self._history[-1]
             if _turned_deg(before, eyes) > p.track_rest_deg_s * (stamp_s - before_s):
@@ -47,7 +48,9 @@ class EyeWatch:
         else:
             self._rest_since_s = stamp_s
         self._history.append((stamp_s, eyes))
-        while self._history[0][0] < stamp_s - p.track_saccade_s - 1e-3:
+        # The newest stays, however long ago it was: late frames are held against it at the same speed. A little slack,
+        # so that frames 33 ms apart are still compared over the whole of 67 ms.
+        while len(self._history) > 1 and self._history[0][0] < stamp_s - p.track_saccade_s - 1e-3:
             self._history.popleft()
         rested = 0.0 if math.isnan(self._rest_since_s) else stamp_s - self._rest_since_s
         return EyeState(saccading, rested)

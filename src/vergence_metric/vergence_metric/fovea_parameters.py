@@ -69,13 +69,13 @@ class TrackerParameters(Parameters):
     """How the class-free tracker locks, follows and gives up."""
 
     track_saccade_deg: float = parameter(
-        4.0,
-        "a turn of the left eye by more than this within track_saccade_s is a saccade",
+        2.5,
+        "a turn of an eye by more than this within track_saccade_s is a saccade",
         unit="deg",
         minimum=0.5,
         maximum=30.0,
     )
-    track_saccade_s: float = parameter(0.1, "see track_saccade_deg", unit="s", minimum=0.02, maximum=1.0)
+    track_saccade_s: float = parameter(0.07, "see track_saccade_deg", unit="s", minimum=0.02, maximum=1.0)
     track_settle_s: float = parameter(
         0.12, "the joints must have rested this long before the tracker locks", unit="s", minimum=0.0, maximum=2.0
     )
