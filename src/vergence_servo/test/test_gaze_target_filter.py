@@ -120,7 +120,7 @@ def test_weights_follow_what_is_seen() -> None:
     def see(version_rad: float, time_s: float) -> float:
         calm_then_wild.advance(INTERVAL_S)
         measurement = seen((version_rad, 0.0, 0.0), time_s, np.zeros(3))
-        calm_then_wild.correct(calm_then_wild.fits(measurement, time_s), measurement.sigmas)
+        calm_then_wild.correct(calm_then_wild.fits(measurement, time_s))
         assert calm_then_wild.weights.sum() == pytest.approx(1.0)
         return float(calm_then_wild.weights[1])
 

@@ -16,6 +16,8 @@ Array = npt.NDArray[np.float64]
 VERSION, VERGENCE, TILT = 0, 2, 4
 _DEPTH_SHARE = 0.25
 """Vergence accelerates less than directions do: a quarter of it at 0.5 m already is a metre per second squared."""
+_RATE_HOLDS_S = 0.15
+"""A measurement that is later than this is believed the less, the more a target may change its speed."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +44,14 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Fit:
-    """How a model met a measurement: design (n, 6), innovation (n,), its covariance (n, n) and squared distance."""
+    """How a model met a measurement: design (n, 6), innovation (n,), its covariance (n, n) and squared distance.
+
+    `noise` (n,) are the measurement's variances, as far as this model can believe it.
+    """
 
     design: Array
     innovation: Array
+    noise: Array
     spread: Array
     distance: float
 
@@ -88,14 +94,18 @@ class Kalman:
         design[:, 0::2] = measurement.coefficients
         if self.moves:
             design[:, 1::2] = measurement.coefficients * (measurement.stamps_s - now_s)[:, None]
-        spread = design @ self.covariance @ design.T + np.diag(measurement.sigmas**2)
+        noise = measurement.sigmas**2
+        late_s = now_s - measurement.stamp_s - _RATE_HOLDS_S
+        if self.moves and late_s > 0:
+            noise = noise + (0.5 * self._accelerations[VERSION] * late_s**2) ** 2
+        spread = design @ self.covariance @ design.T + np.diag(noise)
         innovation = measurement.values - design @ self.state
-        return Fit(design, innovation, spread, float(innovation @ np.linalg.solve(spread, innovation)))
+        return Fit(design, innovation, noise, spread, float(innovation @ np.linalg.solve(spread, innovation)))
 
-    def correct(self, fit: Fit, sigmas: Array) -> None:
+    def correct(self, fit: Fit) -> None:
         """Take the measurement that `fit` is of."""
         gain = np.linalg.solve(fit.spread, fit.design @ self.covariance).T
         self.state = self.state + gain @ fit.innovation
         # Joseph's form: the short one loses its positive variances where a certain measurement meets a vague prior.
         kept = np.eye(6) - gain @ fit.design
-        self.covariance = kept @ self.covariance @ kept.T + (gain * sigmas**2) @ gain.T
+        self.covariance = kept @ self.covariance @ kept.T + (gain * fit.noise) @ gain.T

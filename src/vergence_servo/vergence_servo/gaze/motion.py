@@ -60,12 +60,12 @@ class Motion:
         least = float(losses.min())
         return least - math.log(float(self.weights @ np.exp(least - losses)) + 1e-12)
 
-    def correct(self, fits: tuple[Fit, Fit], sigmas: Array) -> None:
+    def correct(self, fits: tuple[Fit, Fit]) -> None:
         """Take the measurement that `fits` are of."""
         losses = np.array([fit.loss for fit in fits])
         weights = self.weights * np.exp(losses.min() - losses)
         for mode, fit in zip(self.modes, fits, strict=True):
-            mode.correct(fit, sigmas)
+            mode.correct(fit)
         self.weights = _sensible(weights / max(float(weights.sum()), 1e-300))
 
     def _moments(self, weights: Array) -> tuple[Array, Array]:

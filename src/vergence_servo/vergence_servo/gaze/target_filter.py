@@ -28,7 +28,7 @@ _JUMP_SIGMA_RAD = 0.3
 _RATE_SIGMA_RAD_S = 0.5
 _LONGEST_PREDICTION_S = 2.0
 _LARGEST_VARIANCE = 1.0
-_LATEST_S = 0.3
+_LATEST_S = 1.0
 _COMPARABLE_S = 0.5
 _BELIEVED = 0.3
 _FOLLOWING_VARIANCE = 1e-5
@@ -236,7 +236,7 @@ class TargetFilter:
         self._rest.covariance[0::2, 0::2] = covariance[0::2, 0::2] + np.eye(3) * _FOLLOWING_VARIANCE
 
     def _take(self, measurement: Measurement, motion: tuple[Fit, Fit]) -> None:
-        self._motion.correct(motion, measurement.sigmas)
+        self._motion.correct(motion)
         rest = self._rest.fit(measurement, self._time_s)
         off = rest.distance / self._bound(measurement)
         if off > 1.0 and self._moving:
@@ -247,7 +247,7 @@ class TargetFilter:
                 # It has moved somewhat: what was known of its place counts the less, the farther off that was.
                 self._rest.covariance = self._rest.covariance * off
                 rest = self._rest.fit(measurement, self._time_s)
-            self._rest.correct(rest, measurement.sigmas)
+            self._rest.correct(rest)
         self.last_accepted_s = measurement.stamp_s
 
     def _bound(self, measurement: Measurement) -> float:
