@@ -50,6 +50,11 @@ class BelievedTarget:
         estimate = self.estimate(time_s)
         return estimate.joint_rates_rad_s if estimate is not None and estimate.moving else np.zeros(3)
 
+    def target_itself_unseen_s(self, now_s: float) -> float:
+        """Return for how long nothing but the fovea has told of a target that was seen before; 0 if it never was."""
+        seen_s = self.target_itself_seen_s
+        return now_s - seen_s if math.isfinite(seen_s) else 0.0
+
     def start_from(self, measurement: Measurement) -> None:
         """Begin the filter at a first sighting, with the vergence that is assumed while only one eye sees."""
         wide = math.radians(60.0)

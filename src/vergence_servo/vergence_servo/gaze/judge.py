@@ -21,6 +21,7 @@ class PairVerdict:
     steady: bool
     resting: bool
     doubt: float
+    placed: bool
 
 
 class VergedJudge:
@@ -90,6 +91,7 @@ class VergedJudge:
         resting: bool,
         doubt: float = 1.0,
         aside_rad: float = 0.0,
+        placed: bool = True,
     ) -> bool:
         """Judge one pair in which the target was measured; returns `verged`.
 
@@ -101,12 +103,13 @@ class VergedJudge:
             resting: whether the eyes were still enough in that pair to see.
             doubt: the probability that the eyes are off after all, for all that was known before and is seen now.
             aside_rad: the largest error of a gaze direction in that pair.
+            placed: whether the target itself was seen lately, not only something at its depth.
         """
         if not stamp_s >= self._last_pair_s or (stamp_s == self._last_pair_s and (self.verged or self._pair is None)):
             return self.verged
         if stamp_s > self._last_pair_s:
             self._last_pair_s, self._good_before = stamp_s, self._good
-        self._pair = PairVerdict(stamp_s, error_rad, aside_rad, steady, resting, doubt)
+        self._pair = PairVerdict(stamp_s, error_rad, aside_rad, steady, resting, doubt, placed)
         if self.verged:
             self._stay(self._pair, now_s)
         else:
@@ -131,6 +134,9 @@ class VergedJudge:
             self.verged, self.since_s, self._good = False, math.nan, 0
 
     def _within(self, pair: PairVerdict, now_s: float, limits_rad: tuple[float, float], contrast_limit: float) -> bool:
+        if not pair.placed:
+            self.reason = "something at the target's depth lies at the fovea, but the target was not seen for long"
+            return False
         for error_rad, limit_rad in zip((pair.error_rad, pair.aside_rad), limits_rad, strict=True):
             if not abs(error_rad) <= limit_rad:
                 self.reason = f"error {math.degrees(abs(error_rad)):.2f} deg"

@@ -38,6 +38,7 @@ _STILL_SPEED_RAD_S = 0.2
 _ARRIVED_RAD = 0.004
 _COMMANDED_AHEAD_S = 0.03
 _DOUBT_OF_MOTION = 0.1
+_PLACE_KNOWN_S = 1.0
 _NOTHING_KNOWN = Belief(0.0, math.inf)
 
 
@@ -213,7 +214,8 @@ class Perception:
             limit, off, sigmas = self._p.verged_leave_rad, estimate.joints_rad - joints, estimate.joint_sigmas_rad
             left = doubt(self._foretold, Belief(vergence_error, float(estimate.sigmas_rad[1])), limit)
             left += sum(Belief(float(off[i]), float(sigmas[i])).beyond(limit) for i in judged)
-        self.judge.see_pair(stamp_s, now_s, error, steady, verging, left, aside)
+        placed = self.tracking.source != "fovea" or self.tracking.target_itself_unseen_s(now_s) < _PLACE_KNOWN_S
+        self.judge.see_pair(stamp_s, now_s, error, steady, verging, left, aside, placed)
 
     def _is_there(self, now_s: float) -> bool:
         """Tell whether the eyes, as they stand by now, are on the target as it is predicted, as far as that is sure."""
