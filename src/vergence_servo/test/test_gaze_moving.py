@@ -1,8 +1,8 @@
-"""Targets that swing, jump, and pass before another: the whole core against the fake head, at the head's 50 Hz."""
+"""Targets that swing, jump, pass before another, and are seen late or amiss: the core against the fake head, at 50 Hz."""
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 from vergence_servo.gaze.controller import GazeController
 from vergence_servo.gaze.fake_head import TICK_S, FakeHead, Seeing
 from vergence_servo.gaze.goals import Goal, GoalKind
+from vergence_servo.gaze.observations import BoxSighting, Observation, TrackSighting
 from vergence_servo.gaze.parameters import GazeParameters
 from vergence_servo.gaze.phases import Phase
 
@@ -24,7 +25,10 @@ Place = Callable[[float], np.ndarray]
 
 @dataclass
 class Trial:
-    """What came of a target that is known by its class, or by a click; sampled at the control rate."""
+    """What came of a target that is known by its class, or by a click; sampled at the control rate.
+
+    `arriving` alters what arrives at a time, or withholds it (None).
+    """
 
     target: Place
     seeing: Seeing
@@ -35,6 +39,7 @@ class Trial:
     seed: int = 3
     mistaken: Mapping[str, Callable[[float], Any]] = field(default_factory=dict)
     start_rad: Mapping[str, float] | None = None
+    arriving: Callable[[Observation, float], Observation | None] = lambda observation, time_s: observation
 
     def __post_init__(self) -> None:
         rig = default_rig().with_servos(self.servo)
@@ -44,7 +49,8 @@ class Trial:
         arrived: list[Any] = []
         samples: list[tuple[float, float, Phase, bool]] = []
         for tick in range(1, int(self.until_s / TICK_S)):
-            arrived += head.advance()
+            altered = (self.arriving(observation, head.time_s) for observation in head.advance())
+            arrived += [observation for observation in altered if observation is not None]
             if tick % CONTROL_TICKS:
                 continue
             if tick == 30:
@@ -61,6 +67,7 @@ class Trial:
         self.time_s = np.array([sample[0] for sample in samples])
         self.error_deg = np.array([sample[1] for sample in samples])
         self.phases = [sample[2] for sample in samples]
+        self.reason = command.report.reason
         self.verged = np.array([sample[3] for sample in samples])
 
     def settled_s(self, after_s: float, within_deg: float) -> float:
@@ -143,3 +150,45 @@ def test_eyes_that_swing_over_the_target_are_not_called_verged(servo: ServoSpec,
     trial = Trial(lambda time_s: point, FRAME_RATE, servo, 3.0, law="pid_pursuit", seed=seed, start_rad=start)
     assert trial.verged[-1]
     assert trial.error_deg[trial.verged].max() < 1.0
+
+
+LOADED = Seeing(
+    latency_s=0.12, frame_ticks=15, noise_px=0.4, boxes=True, box_frame_ticks=60, box_latency_s=0.16, box_noise_px=0.8
+)
+"""As on two full cores: 20 pairs a second, boxes at 5 Hz."""
+
+
+def to_and_fro(time_s: float) -> np.ndarray:
+    return np.array([0.6, 0.06 * math.sin(math.tau * 0.12 * max(time_s - 1.0, 0.0)), 0.0])
+
+
+@pytest.mark.parametrize("target", [lambda time_s: to_and_fro(0.0), to_and_fro], ids=["at_rest", "moving"])
+def test_a_track_that_slips_is_put_right_by_the_boxes(target: Place) -> None:
+    def slipping(observation: Observation, time_s: float) -> Observation:
+        if not isinstance(observation, TrackSighting):
+            return observation
+        slip = math.tan(math.radians(0.7 if time_s > 2.5 else 0.0))
+        return replace(observation, track_id=1, lock_stamp_s=0.1, left_x=observation.left_x + slip)
+
+    trial = Trial(target, LOADED, until_s=7.0, click=True, arriving=slipping)
+    assert np.median(trial.error_deg[trial.time_s > 4.5]) < 0.35
+    assert trial.verged[trial.time_s > 4.5].mean() > 0.8
+
+
+def test_a_moving_target_that_only_late_boxes_show_is_followed() -> None:
+    seeing = replace(LOADED, track=False, box_latency_s=0.6, box_frame_ticks=45)
+    trial = Trial(to_and_fro, seeing, until_s=8.0, click=True)
+    assert np.median(trial.error_deg[trial.time_s > 2.5]) < 1.5
+    assert trial.error_deg[trial.time_s > 2.5].max() < 4.0
+
+
+@pytest.mark.parametrize("seen", [False, True])
+def test_what_only_the_fovea_still_sees_is_not_called_verged_for_long(seen: bool) -> None:
+    def hiding(observation: Observation, time_s: float) -> Observation | None:
+        hidden = isinstance(observation, TrackSighting | BoxSighting) and time_s > 2.0 and not seen
+        return None if hidden else observation
+
+    trial = Trial(lambda time_s: to_and_fro(0.0), LOADED, until_s=4.0, click=True, arriving=hiding)
+    assert trial.verged[(trial.time_s > 1.5) & (trial.time_s < 2.5)].all()
+    assert trial.verged[trial.time_s > 3.5].any() == seen
+    assert seen or "the target was not seen for long" in trial.reason

@@ -4,6 +4,7 @@ What was asked for may lie beside the middle of what is tracked or detected; tha
 """
 
 import math
+from collections import deque
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,10 @@ Array = npt.NDArray[np.float64]
 
 _SURE = 4.0
 _BOX_MARGIN_RAD = 0.01
-_LONGEST_MEAN = 8
+_BOXES_TO_LEARN = 5
+_LATER_SHARE = 0.01
+_LONGEST_MEAN_OF_TRACK = 4
+_SAME_PAIR_S = 0.012
 
 
 class TrackLock:
@@ -22,8 +26,10 @@ class TrackLock:
 
     def __init__(self) -> None:
         self.track_id: int | None = None
-        self.offset = (0.0, 0.0)
+        self.offset = np.zeros(2)
         self._refused_id: int | None = None
+        self._compared = 0
+        self._seen: deque[tuple[float, Array]] = deque(maxlen=30)
 
     def refuse(self) -> None:
         """The track is something else's: do not take it again."""
@@ -38,11 +44,10 @@ class TrackLock:
         depth_margin_rad: float,
     ) -> str:
         """Take a track at `seen_rad` (left pan, right pan, tilt) for the target's; return why not, or nothing."""
-        joints = estimate.joints_rad
-        offset = (float(joints[0] - seen_rad[0]), float(joints[2] - seen_rad[2]))
+        offset = (estimate.joints_rad - seen_rad)[[0, 2]]
         deeper = float(seen_rad[1] - seen_rad[0]) - estimate.vergence_rad
         vergence_off_rad = deeper if math.isfinite(deeper) else 0.0
-        distance = math.hypot(*offset)
+        distance = float(np.hypot(*offset))
         if track_id == self._refused_id:
             return "the tracker follows something that the boxes say is not the target"
         if distance > radius_rad:
@@ -51,9 +56,26 @@ class TrackLock:
             return f"the tracker follows something {math.degrees(vergence_off_rad):.1f} deg nearer or farther"
         # The first lock after a click keeps the click. A tracker that did not lock anew because the move was small
         # still follows its old target next to it.
-        self.offset = offset if self.track_id is None else (0.0, 0.0)
+        first = self.track_id is None
+        self.offset, self._compared = (offset, 1) if first else (np.zeros(2), 0)
         self.track_id = track_id
+        self._seen.clear()
         return ""
+
+    def take(self, stamp_s: float, seen_rad: Array) -> None:
+        """Keep where the track was, at `seen_rad` (left pan, right pan, tilt), for who is slower to say."""
+        self._seen.append((stamp_s, seen_rad[[0, 2]]))
+
+    def hold_against(self, stamp_s: float, target_rad: Array) -> None:
+        """Learn the offset from where boxes have the target (left pan, right pan, tilt) in a pair.
+
+        A track slips along what it follows, and may have locked on beside it; boxes are around the same thing always.
+        """
+        same = [seen for seen_s, seen in self._seen if abs(seen_s - stamp_s) < _SAME_PAIR_S]
+        if not same or not np.isfinite(target_rad[[0, 2]]).all():
+            return
+        self._compared = min(self._compared + 1, _LONGEST_MEAN_OF_TRACK)
+        self.offset = self.offset + (target_rad[[0, 2]] - same[-1] - self.offset) / self._compared
 
 
 class BoxLock:
@@ -81,6 +103,8 @@ class BoxLock:
         if not np.abs(beside).max() <= half + _BOX_MARGIN_RAD + min(sigma, half) or deeper > vergence_bound_rad:
             self.lose()
             return False
-        self.count = min(self.count + 1, _LONGEST_MEAN)
-        self.offset = self.offset + (beside - self.offset) / self.count
+        # What was asked for is known best at first; later the boxes are what a track that slips is held against.
+        self.count += 1
+        share = 1.0 / self.count if self.count <= _BOXES_TO_LEARN else _LATER_SHARE
+        self.offset = self.offset + share * (beside - self.offset)
         return True

@@ -21,6 +21,7 @@ from vergence_servo.gaze.directions import SightingError
 from vergence_servo.gaze.exposures import Exposures, positive_sigma
 from vergence_servo.gaze.joint_history import JointHistory
 from vergence_servo.gaze.joint_moves import JointMoves
+from vergence_servo.gaze.kalman import Measurement
 from vergence_servo.gaze.locks import BoxLock, TrackLock
 from vergence_servo.gaze.observations import BoxSighting, FoveaDisparity, PointSighting, TrackSighting
 from vergence_servo.gaze.parameters import GazeParameters
@@ -104,8 +105,8 @@ class TargetTracking(BelievedTarget):
                 # Something else covers part of it: where it is can still be told.
                 there = replace(sighting, disparity_rad=math.nan)
                 measurement, seen = directions.track(self._history, there, sigma, disparity_sigma)
-        pan, tilt = self._track.offset
-        measurement, seen = directions.shifted(measurement, pan, tilt), seen + np.array([pan, pan, tilt])
+        self._track.take(sighting.stamp_s, seen)
+        measurement, seen = _beside(measurement, seen, self._track.offset)
         return self.believe(measurement, seen, sighting.skew_s, now_s, "track")
 
     def see_fovea(self, sighting: FoveaDisparity, now_s: float) -> bool:
@@ -169,8 +170,8 @@ class TargetTracking(BelievedTarget):
         if not by_class:
             if not self._contains_target(sighting, seen, own_depth):
                 return False
-            pan, tilt = (float(angle) for angle in self._boxes.offset)
-            measurement, seen = directions.shifted(measurement, pan, tilt), seen + np.array([pan, pan, tilt])
+            measurement, seen = _beside(measurement, seen, self._boxes.offset)
+            self._track.hold_against(sighting.stamp_s, seen)
         elif not self.filter.initialised:
             self.start_from(measurement)
 
@@ -242,6 +243,12 @@ class TargetTracking(BelievedTarget):
         )
         self.note = why_not or self.note
         return not why_not
+
+
+def _beside(measurement: Measurement, seen_rad: Array, offset_rad: Array) -> tuple[Measurement, Array]:
+    """Return measurement and place (3,) of what lies beside the thing that was seen, by pan and tilt (2,)."""
+    pan, tilt = (float(angle) for angle in offset_rad)
+    return directions.shifted(measurement, pan, tilt), seen_rad + np.array([pan, pan, tilt])
 
 
 def _own_depth(vergence_rad: float, extent_rad: float) -> float:
