@@ -20,7 +20,9 @@ from vergence_bringup.processes import NodeCommand, ProcessGroup, config_dir, en
 from vergence_common.domains import own_domain
 from vergence_rig.rig import Rig, load_rig
 
-# Of metric II: the demo's own recorder and ground truth take their share of two cores.
+# The simulator, its ground truth and the demo's recorder share two cores with the nodes: what they cannot keep up with
+# comes late, and late images are worth less than fewer.
+_FRAME_RATE_HZ = 20.0
 _BOX_RATE_HZ = 6.0
 
 
@@ -100,7 +102,7 @@ def _runner(options: argparse.Namespace, rig: Rig, alive: Callable[[], None]) ->
 
 def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
     rig = str(_ideal_rig(options.out) if options.ideal else config_dir() / "rig.yaml")
-    sim: dict[str, object] = {"rig": rig, "seed": options.seed}
+    sim: dict[str, object] = {"rig": rig, "seed": options.seed, "frame_rate_hz": _FRAME_RATE_HZ}
     if options.ideal:
         sim["preset"] = "ideal"
     return {

@@ -1,4 +1,4 @@
-"""Targets that swing, jump, pass before another, and are seen late or amiss: the core against the fake head, at 50 Hz."""
+"""Targets that swing, jump, pass before another, or are seen late or amiss: the core against the fake head, 50 Hz."""
 
 import math
 from collections.abc import Callable, Mapping
