@@ -23,7 +23,7 @@ from vergence_rig.rig import Rig, load_rig
 # The simulator, its ground truth and the demo's recorder share two cores with the nodes: what they cannot keep up with
 # comes late, and late images are worth less than fewer.
 _FRAME_RATE_HZ = 20.0
-_BOX_RATE_HZ = 6.0
+_BOX_RATE_HZ = 8.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -42,9 +42,11 @@ def test_pursuit_at_30_degrees_a_second_is_no_saccade():
         assert not watch.update(k * FRAME_S, EyeAngles(math.radians(30.0 * k * FRAME_S), 0.0, 0.0)).saccading
 
 
-@pytest.mark.parametrize(("turn_deg", "saccade"), [(3.4, False), (3.7, True)])
-def test_frames_that_come_late_are_held_against_the_same_speed(turn_deg, saccade):
-    _, state, _ = turned_over(1, turn_deg, frame_s=0.1)
+@pytest.mark.parametrize(
+    ("frame_s", "turn_deg", "saccade"), [(0.1, 2.4, False), (0.1, 2.6, True), (0.28, 4.9, False), (0.28, 5.1, True)]
+)
+def test_a_frame_that_comes_late_is_held_against_the_one_before(frame_s, turn_deg, saccade):
+    _, state, _ = turned_over(1, turn_deg, frame_s)
     assert state.saccading is saccade
 
 

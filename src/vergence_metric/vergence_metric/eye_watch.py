@@ -35,8 +35,13 @@ class EyeWatch:
     def update(self, stamp_s: float, eyes: EyeAngles) -> EyeState:
         """Take the angles at a frame's stamp; stamps must increase."""
         p = self._parameters
+        # The newest stays, however long ago it was. A little slack, so that frames 33 ms apart are still compared over
+        # the whole of 67 ms.
+        while len(self._history) > 1 and self._history[0][0] < stamp_s - p.track_saccade_s - 1e-3:
+            self._history.popleft()
+        # Of a late frame nobody knows how fast the eyes turned before it: twice the time is still one glance.
         saccading = any(
-            _turned_deg(before, eyes) > p.track_saccade_deg * max((stamp_s - s) / p.track_saccade_s, 1.0)
+            _turned_deg(before, eyes) > p.track_saccade_deg * max(0.5 * (stamp_s - s) / p.track_saccade_s, 1.0)
             for s, before in self._history
         )
         if self._history:
@@ -48,10 +53,6 @@ class EyeWatch:
         else:
             self._rest_since_s = stamp_s
         self._history.append((stamp_s, eyes))
-        # The newest stays, however long ago it was: late frames are held against it at the same speed. A little slack,
-        # so that frames 33 ms apart are still compared over the whole of 67 ms.
-        while len(self._history) > 1 and self._history[0][0] < stamp_s - p.track_saccade_s - 1e-3:
-            self._history.popleft()
         rested = 0.0 if math.isnan(self._rest_since_s) else stamp_s - self._rest_since_s
         return EyeState(saccading, rested)
 

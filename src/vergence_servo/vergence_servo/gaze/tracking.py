@@ -238,9 +238,10 @@ class TargetTracking(BelievedTarget):
         estimate = self.estimate(sighting.stamp_s)
         if estimate is None or sighting.stamp_s < self._wanted_since_s:
             return False
-        why_not = self._track.adopt(
-            sighting.track_id, seen_rad, estimate, self._p.adopt_radius_rad, self._p.disagreement_rad
-        )
+        # Of unknown depth it is the target only where the eye looked when it was locked on.
+        known = math.isfinite(seen_rad[1])
+        radius_rad = self._p.adopt_radius_rad if known else min(self._p.adopt_radius_rad, self._p.fovea_radius_rad)
+        why_not = self._track.adopt(sighting.track_id, seen_rad, estimate, radius_rad, self._p.disagreement_rad)
         self.note = why_not or self.note
         return not why_not
 
