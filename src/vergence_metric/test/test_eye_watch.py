@@ -50,9 +50,21 @@ def test_a_frame_that_comes_late_is_held_against_the_one_before(frame_s, turn_de
     assert state.saccading is saccade
 
 
+@pytest.mark.parametrize(("told", "jumped"), [(False, False), (True, True)])
+def test_a_small_saccade_in_a_long_gap_shows_in_what_the_joints_told_meanwhile(told, jumped):
+    watch, after = EyeWatch(TrackerParameters()), EyeAngles(math.radians(3.2), 0.0, 0.0)
+    watch.update(1.0, EyeAngles(0.0, 0.0, 0.0))
+    meanwhile = [(0.9 + 0.02 * k, EyeAngles(0.0, 0.0, 0.0) if k < 9 else after) for k in range(20)]
+    state = watch.update(1.25, after, meanwhile if told else [])
+    assert (state.saccading, state.jumped) == (False, jumped)
+    assert not watch.update(1.3, after, meanwhile).jumped
+
+
 @pytest.mark.parametrize("turned", [(0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)])
 def test_any_joint_makes_a_saccade(turned):
     watch = EyeWatch(TrackerParameters())
     assert not watch.update(0.0, EyeAngles(0.0, 0.0, 0.0)).saccading
-    assert watch.update(FRAME_S, EyeAngles(*turned)).saccading
+    state = watch.update(FRAME_S, EyeAngles(*turned))
+    assert state.saccading
+    assert state.jumped
     assert not watch.update(1.0, EyeAngles(*turned)).saccading

@@ -61,3 +61,10 @@ def test_the_past_is_forgotten_after_a_while() -> None:
     history = turning(samples=400)
     assert history.at(1000 * MS, 1000 * MS) is None
     assert history.at(2500 * MS, 2500 * MS) is not None
+
+
+def test_what_was_told_between_two_stamps_is_given_in_order() -> None:
+    told = turning().told_between(30 * MS, 60 * MS)
+    assert [stamp_ns for stamp_ns, _ in told] == [40 * MS, 50 * MS]
+    assert told[0][1] == EyeAngles(0.04, -0.08, 0.02)
+    assert JointHistory().told_between(0, 100 * MS) == []

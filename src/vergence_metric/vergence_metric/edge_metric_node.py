@@ -24,6 +24,8 @@ from vergence_metric.viewing_angles import angular_disparity
 from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
 from vergence_rig.rig import load_rig
 
+_GLANCED_BACK_NS = 500_000_000
+
 
 class EdgeMetricNode(PairNode):
     """Measures the newest pair on a thread of its own; the executor's thread only takes images and pairs them."""
@@ -78,8 +80,11 @@ class EdgeMetricNode(PairNode):
 
     def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, models: Models | None) -> None:
         with self._times.measure("tracker"):
-            eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
-            track = self._measurement.track(edge, pair.left_stamp_ns * 1e-9, eyes, models)
+            now_ns = pair.left_stamp_ns
+            eyes = self._joints.at(now_ns, pair.right_stamp_ns)
+            told = self._joints.told_between(now_ns - _GLANCED_BACK_NS, now_ns)
+            on_the_way = [(stamp_ns * 1e-9, angles) for stamp_ns, angles in told]
+            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models, on_the_way)
         angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
         self._track_publisher.publish(track_message(track, edge, angular, pair.left.header, pair.skew_ns * 1e-9))
 

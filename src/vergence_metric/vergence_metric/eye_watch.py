@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,48 +14,70 @@ from vergence_rig.geometry import EyeAngles, rotation_rig_from_optical
 Pixel = tuple[float, float]
 
 
+Told = tuple[float, EyeAngles]
+"""Joint angles and when the eyes had them [s]."""
+
+
 @dataclass(frozen=True)
 class EyeState:
-    """Whether an eye is in a saccade, and for how long the joints have rested (0 while they turn)."""
+    """What the eyes do at a frame.
+
+    `saccading` tells whether they are in a saccade, `jumped` whether they were in one since the frame before; the
+    joints have rested for `rested_s`, 0 while they turn.
+    """
 
     saccading: bool
+    jumped: bool
     rested_s: float
 
 
 class EyeWatch:
-    """Tells saccades and rest from the joint angles of successive frames.
+    """Tells saccades and rest from the joint angles of successive frames, and from those that were told between them.
 
     Either eye's jump counts: one of the right eye alone is a jump in depth, to something else on the same ray.
     """
 
     def __init__(self, parameters: TrackerParameters) -> None:
         self._parameters = parameters
-        self._history: deque[tuple[float, EyeAngles]] = deque()
+        self._history: deque[Told] = deque()
+        self._frame: Told | None = None
         self._rest_since_s = math.nan
 
-    def update(self, stamp_s: float, eyes: EyeAngles) -> EyeState:
-        """Take the angles at a frame's stamp; stamps must increase."""
+    def update(self, stamp_s: float, eyes: EyeAngles, on_the_way: Iterable[Told] = ()) -> EyeState:
+        """Take the angles at a frame's stamp; stamps must increase. What of `on_the_way` is not since then is ignored.
+
+        Without it, what happens between two frames that a busy machine lets be far apart is a guess.
+        """
+        jumped = False
+        for told_s, angles in on_the_way:
+            if self._history and self._history[-1][0] < told_s < stamp_s:
+                jumped |= self._turns_fast(told_s, angles)
+        saccading = self._turns_fast(stamp_s, eyes)
+        if self._frame is None:
+            self._rest_since_s = stamp_s
+        else:
+            before_s, before = self._frame
+            if _turned_deg(before, eyes) > self._parameters.track_rest_deg_s * (stamp_s - before_s):
+                self._rest_since_s = math.nan
+            elif math.isnan(self._rest_since_s):
+                self._rest_since_s = before_s
+        self._frame = stamp_s, eyes
+        rested = 0.0 if math.isnan(self._rest_since_s) else stamp_s - self._rest_since_s
+        return EyeState(saccading, saccading or jumped, rested)
+
+    def _turns_fast(self, stamp_s: float, eyes: EyeAngles) -> bool:
         p = self._parameters
         # The newest stays, however long ago it was. A little slack, so that frames 33 ms apart are still compared over
         # the whole of 67 ms.
         while len(self._history) > 1 and self._history[0][0] < stamp_s - p.track_saccade_s - 1e-3:
             self._history.popleft()
         # Of a late frame nobody knows how fast the eyes turned before it: twice the time is still one glance.
-        saccading = any(
+        fast = any(
             _turned_deg(before, eyes) > p.track_saccade_deg * max(0.5 * (stamp_s - s) / p.track_saccade_s, 1.0)
             for s, before in self._history
         )
-        if self._history:
-            before_s, before = self._history[-1]
-            if _turned_deg(before, eyes) > p.track_rest_deg_s * (stamp_s - before_s):
-                self._rest_since_s = math.nan
-            elif math.isnan(self._rest_since_s):
-                self._rest_since_s = before_s
-        else:
-            self._rest_since_s = stamp_s
         self._history.append((stamp_s, eyes))
-        rested = 0.0 if math.isnan(self._rest_since_s) else stamp_s - self._rest_since_s
-        return EyeState(saccading, rested)
+        return fast
 
 
 def _turned_deg(before: EyeAngles, now: EyeAngles) -> float:

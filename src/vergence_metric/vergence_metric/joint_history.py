@@ -58,6 +58,15 @@ class JointHistory:
             return None
         return EyeAngles(left[_PAN_LEFT], right[_PAN_RIGHT], left[_TILT])
 
+    def told_between(self, begin_ns: int, end_ns: int) -> list[tuple[int, EyeAngles]]:
+        """Return the angles that were told between two stamps, with theirs [ns], in order."""
+        samples = list(self._samples)
+        return [
+            (stamp_ns, EyeAngles(angles[_PAN_LEFT], angles[_PAN_RIGHT], angles[_TILT]))
+            for stamp_ns, angles in samples
+            if begin_ns < stamp_ns < end_ns
+        ]
+
     def _interpolated(self, samples: list[_Sample], stamp_ns: int) -> tuple[float, ...] | None:
         if stamp_ns < samples[0].stamp_ns or stamp_ns > samples[-1].stamp_ns + self._extrapolate_ns:
             return None

@@ -1,5 +1,6 @@
 """All that is measured on a pair of images, stage by stage, so that each can be published as soon as it is known."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +10,7 @@ from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
 from vergence_metric.edge_parameters import EdgeMetricParameters
+from vergence_metric.eye_watch import Told
 from vergence_metric.fovea_parameters import DisparityParameters, TrackerParameters
 from vergence_metric.track import Track, TrackStatus
 from vergence_metric.tracker import TargetTracker
@@ -69,7 +71,14 @@ class PairMeasurement:
         """Tell whether the eyes are verged, by the fovea's contrast, the signed error, and the last verdict."""
         return self._judge.update(edge.foveal_contrast, error_px, confidence)
 
-    def track(self, edge: EdgeMetricResult, stamp_s: float, eyes: EyeAngles | None, models: Models | None) -> Track:
+    def track(
+        self,
+        edge: EdgeMetricResult,
+        stamp_s: float,
+        eyes: EyeAngles | None,
+        models: Models | None,
+        on_the_way: Iterable[Told] = (),
+    ) -> Track:
         """Return where the target is in a pair measured by `edge`.
 
         Args:
@@ -77,6 +86,7 @@ class PairMeasurement:
             stamp_s: of the left image.
             eyes: joint angles at the images' stamps, None if they are not known.
             models: both cameras; None takes those of the rig, if they are of the images' size.
+            on_the_way: joint angles that were told since the pair before, in order of their stamps [s].
         """
         height, width = edge.left_grey.shape
         models = models or self._rig_models
@@ -87,7 +97,7 @@ class PairMeasurement:
         if self._tracker is None or models != self._models:
             self._models, self._ids_used = models, self._newest_id
             self._tracker = TargetTracker(self._parameters, self._estimator, *models, self._baseline_m)
-        track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes)
+        track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes, on_the_way)
         self._newest_id = self._ids_used + track.track_id
         return replace(track, track_id=self._newest_id)
 

@@ -10,13 +10,14 @@ until it shows again.
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from vergence_metric.appearance import Appearance, Sighting, distance
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
-from vergence_metric.eye_watch import EyeState, EyeView, EyeWatch, Pixel
+from vergence_metric.eye_watch import EyeState, EyeView, EyeWatch, Pixel, Told
 from vergence_metric.fovea_parameters import TrackerParameters
 from vergence_metric.image_motion import image_motion_px
 from vergence_metric.track import NOWHERE, Track, TrackStatus
@@ -64,7 +65,9 @@ class TargetTracker:
         """Lock anew on what lies at the fovea as soon as the eyes rest, as after a saccade."""
         self._target, self._wants_lock = None, True
 
-    def update(self, left: Image, right: Image, stamp_s: float, eyes: EyeAngles) -> Track:
+    def update(
+        self, left: Image, right: Image, stamp_s: float, eyes: EyeAngles, on_the_way: Iterable[Told] = ()
+    ) -> Track:
         """Take a pair and say where the target is. The left image is kept until the next call: do not write into it.
 
         Args:
@@ -72,17 +75,18 @@ class TargetTracker:
             right: (h, w) grey image of the right eye, aligned.
             stamp_s: of the left image; one that is not later than the last resets the tracker.
             eyes: joint angles, of the left eye and the tilt at the left stamp, of the right eye at the right stamp.
+            on_the_way: joint angles that were told since the pair before, in order of their stamps [s].
 
         """
         if stamp_s <= self._stamp_s:
             self.reset()
-        state = self._watch.update(stamp_s, eyes)
+        state = self._watch.update(stamp_s, eyes, on_the_way)
         views = (
             EyeView(self._cameras[0], eyes.pan_left_rad, eyes.tilt_rad),
             EyeView(self._cameras[1], eyes.pan_right_rad, eyes.tilt_rad),
         )
         before, self._before, self._stamp_s = self._before, left, stamp_s
-        self._wants_lock |= state.saccading
+        self._wants_lock |= state.jumped
         if self._target is not None:
             track = self._follow(self._target, left, right, stamp_s, views)
             self._wants_lock &= not self._is_kept(track, left, stamp_s)

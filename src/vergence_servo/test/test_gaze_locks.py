@@ -60,14 +60,24 @@ def test_boxes_that_one_eye_alone_saw_teach_nothing() -> None:
     np.testing.assert_allclose(lock.offset, 0.0, atol=1e-12)
 
 
-def test_boxes_learn_at_first_and_then_stand() -> None:
+def test_boxes_learn_from_the_track_at_first_and_then_stand() -> None:
     lock = BoxLock()
     for _ in range(5):
         assert lock.adopt(moved(0.4, 0.1), 0.1, math.inf, ESTIMATE)
+        lock.hold_against(moved(0.4, 0.1), PLACE[[0, 2]])
     np.testing.assert_allclose(lock.offset, np.array([-0.4, -0.1]) * DEG, atol=1e-12)
     for _ in range(10):
         assert lock.adopt(moved(1.4, 0.1), 0.1, math.inf, ESTIMATE)
+        lock.hold_against(moved(1.4, 0.1), PLACE[[0, 2]])
     assert abs(lock.offset[0] + 0.4 * DEG) < 0.11 * DEG
+
+
+def test_boxes_do_not_learn_from_what_they_told_themselves() -> None:
+    lock = BoxLock()
+    for k in range(5):
+        assert lock.adopt(moved(0.4 * k, 0.0), 0.1, math.inf, ESTIMATE)
+        lock.hold_against(moved(0.4 * k, 0.0), None)
+    np.testing.assert_allclose(lock.offset, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("depth", "aside_deg", "taken"), [(True, 3.0, True), (False, 3.0, False), (False, 1.0, True)])

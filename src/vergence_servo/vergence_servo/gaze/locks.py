@@ -66,33 +66,40 @@ class TrackLock:
         """Keep where the track was, at `seen_rad` (left pan, right pan, tilt), for who is slower to say."""
         self._seen.append((stamp_s, seen_rad[[0, 2]]))
 
+    def place_at(self, stamp_s: float) -> Array | None:
+        """Return pan and tilt (2,) of the target as the track has it in a pair, None if it was not seen there."""
+        same = [seen for seen_s, seen in self._seen if abs(seen_s - stamp_s) < _SAME_PAIR_S]
+        return same[-1] + self.offset if same else None
+
     def hold_against(self, stamp_s: float, target_rad: Array) -> None:
         """Learn the offset from where boxes have the target (left pan, right pan, tilt) in a pair.
 
         A track slips along what it follows, and may have locked on beside it; boxes are around the same thing always.
         """
-        same = [seen for seen_s, seen in self._seen if abs(seen_s - stamp_s) < _SAME_PAIR_S]
-        if not same or not np.isfinite(target_rad[[0, 2]]).all():
+        place = self.place_at(stamp_s)
+        if place is None or not np.isfinite(target_rad[[0, 2]]).all():
             return
         self._compared = min(self._compared + 1, _LONGEST_MEAN_OF_TRACK)
-        self.offset = self.offset + (target_rad[[0, 2]] - same[-1] - self.offset) / self._compared
+        self.offset = self.offset + (target_rad[[0, 2]] - place) / self._compared
 
 
 class BoxLock:
     """The boxes that are the target's although another thing than a class was asked for: those that contain it."""
 
     def __init__(self) -> None:
-        self.count = 0
-        self.offset = np.zeros(2)
+        self.lose()
 
     def lose(self) -> None:
         """The boxes are something else's."""
-        self.count, self.offset = 0, np.zeros(2)
+        self.adopted = False
+        self.offset = np.zeros(2)
+        self._learnt = 0
 
     def adopt(self, seen_rad: Array, extent_rad: float, vergence_bound_rad: float, estimate: TargetEstimate) -> bool:
-        """Tell whether boxes with middles at `seen_rad` (left pan, right pan, tilt) are the target's; learn the offset.
+        """Tell whether boxes with middles at `seen_rad` (left pan, right pan, tilt) are the target's.
 
-        A single box is as wide as high, for all that is known.
+        The first of them tell how far it lies beside their middles. A single box is as wide as high, for all that is
+        known.
         """
         off = estimate.joints_rad - seen_rad
         pan_off = off[0] if math.isfinite(off[0]) else off[1]
@@ -103,8 +110,22 @@ class BoxLock:
         if not np.abs(beside).max() <= half + _BOX_MARGIN_RAD + min(sigma, half) or deeper > vergence_bound_rad:
             self.lose()
             return False
-        # What was asked for is known best at first; later the boxes are what a track that slips is held against.
-        self.count += 1
-        share = 1.0 / self.count if self.count <= _BOXES_TO_LEARN else _LATER_SHARE
-        self.offset = self.offset + share * (beside - self.offset)
+        if not self.adopted:
+            self.adopted = True
+            self._learn(beside)
         return True
+
+    def hold_against(self, seen_rad: Array, place_rad: Array | None) -> None:
+        """Learn the offset of boxes with middles at `seen_rad` from the target's pan and tilt (2,) by its track.
+
+        Only from that: what was told by boxes alone would teach them that a target that moves lies farther and farther
+        beside them. What was asked for is known best at first; later the boxes are what a track that slips is held
+        against.
+        """
+        if place_rad is not None and np.isfinite(seen_rad[[0, 2]]).all():
+            self._learn(place_rad - seen_rad[[0, 2]])
+
+    def _learn(self, beside: Array) -> None:
+        self._learnt += 1
+        share = 1.0 / self._learnt if self._learnt <= _BOXES_TO_LEARN else _LATER_SHARE
+        self.offset = self.offset + share * (beside - self.offset)

@@ -137,7 +137,7 @@ class TargetTracking(BelievedTarget):
             self.note = "the fovea looks past the target that the boxes show"
             return False
         seen = np.array([math.nan, joints[0] + vergence, math.nan])
-        established = self._track.track_id is not None or self.class_name is not None or self._boxes.count > 0
+        established = self._track.track_id is not None or self.class_name is not None or self._boxes.adopted
         if established and not self._still_at_its_depth(vergence, sigma, stamp_s, now_s):
             self.note = "something at another depth lies at the fovea"
             return False
@@ -170,6 +170,7 @@ class TargetTracking(BelievedTarget):
         if not by_class:
             if not self._contains_target(sighting, seen, own_depth):
                 return False
+            self._boxes.hold_against(seen, self._track.place_at(sighting.stamp_s))
             measurement, seen = _beside(measurement, seen, self._boxes.offset)
             self._track.hold_against(sighting.stamp_s, seen)
         elif not self.filter.initialised:
