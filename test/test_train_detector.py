@@ -170,6 +170,7 @@ class TestCloserLook:
         assert not len(found)
 
 
+@pytest.mark.usefixtures("opengl")
 def test_head_views_hold_the_cube_where_their_boxes_say() -> None:
     views = list(head_views(39_999, 6))
     assert len(views) == 6
@@ -183,6 +184,7 @@ def test_head_views_hold_the_cube_where_their_boxes_say() -> None:
     assert np.median(overlaps) > 0.8
 
 
+@pytest.mark.usefixtures("opengl")
 def test_head_views_are_their_seeds() -> None:
     for first, second in zip(head_views(39_999, 2), head_views(39_999, 2), strict=True):
         np.testing.assert_array_equal(first.image, second.image)

@@ -165,6 +165,7 @@ def page(results: Sequence[Sweep], windows_px: Sequence[int], images: Sequence[s
          _spread([r.curve("contrast", i)[vergence] for r in results])]
         for i, size in enumerate(windows_px)
     ]  # fmt: skip
+    both_ways = [f"{form} {way} [px]" for form in ("plain", "chance", "robust") for way in ("L to R", "R to L")]
     summary = []
     for i, size in enumerate(windows_px):
         row = [f"{size}"]
@@ -189,7 +190,9 @@ def page(results: Sequence[Sweep], windows_px: Sequence[int], images: Sequence[s
     of = len(results) * len(windows_px)
     ratio = np.array([r.figures["plain"][vergence].mean() / np.nanmedian(r.figures["plain"]) for r in results])
     judged = [(r.foveal[vergence], float(np.nanmin(r.foveal[np.abs(ERRORS_DEG) >= 1.0]))) for r in results]
+    told_apart = [[r.scene.name, f"{v:.2f}", f"{u:.2f}"] for r, (v, u) in zip(results, judged, strict=True)]
     threshold = EdgeMetricParameters().verged_contrast
+    passing, dipping = (sum(pair[i] <= threshold for pair in judged) for i in (0, 1))
     return (
         f"""# The edge metric against vergence error
 
@@ -211,21 +214,7 @@ finds and takes out.
 
 The paper reports {PAPER}. Mean over {len(results)} scenes (least to largest):
 
-{
-            table(
-                [
-                    "window",
-                    "plain L to R [px]",
-                    "plain R to L [px]",
-                    "chance L to R [px]",
-                    "chance R to L [px]",
-                    "robust L to R [px]",
-                    "robust R to L [px]",
-                    "contrast",
-                ],
-                at_vergence,
-            )
-        }
+{table(["window", *both_ways, "contrast"], at_vergence)}
 
 The plain figure at vergence is {ratio.mean():.2f} times its own median over the whole sweep ({ratio.min():.2f} to
 {ratio.max():.2f}): low where the target fills the window, close to what any other angle gives where it does not. As in
@@ -246,17 +235,10 @@ Of {of} curves each (scenes times windows) the minimum lies within {NEAR_VERGENC
 Foveal contrast at vergence, and the least it reads anywhere at an error of 1 degree or more (the shipped threshold is
 {threshold:g}; the judge also asks for a small, confident signed error):
 
-{
-            table(
-                ["scene", "at vergence", "least at 1 degree or more"],
-                [[r.scene.name, f"{v:.2f}", f"{u:.2f}"] for r, (v, u) in zip(results, judged, strict=True)],
-            )
-        }
+{table(["scene", "at vergence", "least at 1 degree or more"], told_apart)}
 
-{sum(v <= threshold for v, _ in judged)} of {len(results)} scenes pass at vergence;
-{
-            sum(u <= threshold for _, u in judged)
-        } dip below the threshold somewhere else: there another thing, or a repetition of the
+{passing} of {len(results)} scenes pass at vergence;
+{dipping} dip below the threshold somewhere else: there another thing, or a repetition of the
 same texture (the squares of the cube), lies on the horopter, and only the signed error tells.
 
 ## Where it fails

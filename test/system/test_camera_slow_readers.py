@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence_bringup.processes import NodeCommand, config_dir
+from vergence_bringup.processes import NodeCommand, environment
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(1800)]
 
@@ -71,10 +71,8 @@ class Processes:
         return Reader(self._run([*where, sys.executable, "-c", READER]))
 
     def _run(self, argv: list[str]) -> "subprocess.Popen[str]":
-        profile = os.environ.get("FASTRTPS_DEFAULT_PROFILES_FILE", str(config_dir() / "fastdds.xml"))
-        env = os.environ | {"FASTRTPS_DEFAULT_PROFILES_FILE": profile}
         self._running.append(
-            subprocess.Popen(argv, env=env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+            subprocess.Popen(argv, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         )
         return self._running[-1]
 

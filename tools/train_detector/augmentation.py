@@ -52,15 +52,7 @@ def part_of(
     picture = np.asarray(cv2.resize(image[y : y + h, x : x + w], size_px, interpolation=cv2.INTER_LINEAR), np.uint8)
     factor = np.array([size_px[0] / w, size_px[1] / h] * 2, np.float32)
     inside = (np.clip(boxes - np.array([x, y, x, y], np.float32), 0, [w, h, w, h]) * factor).astype(np.float32)
-    kept = (_share(inside / factor, boxes) >= _LEAST_SEEN) & (
-        (inside[:, 2:] - inside[:, :2]).min(1, initial=np.inf) >= _LEAST_PX
-    )
-    inside = inside[kept]
-    if rng.random() < 0.5:
-        picture, inside = picture[:, ::-1], _mirrored(inside, size_px[0])
-    if strength.colour:
-        picture = _relit(rng, picture)
-    return np.ascontiguousarray(picture), inside
+    return _varied(rng, picture, inside, _share(inside / factor, boxes), strength)
 
 
 def closer_look(
@@ -93,19 +85,21 @@ def closer_look(
     factor = 1.0 / window.scale
     inside = (boxes - np.array([window.x, window.y] * 2)) * factor
     inside = np.clip(inside, 0, [*size_px, *size_px]).astype(np.float32)
-    kept = (_share(inside / factor, boxes) >= _LEAST_SEEN) & (
-        (inside[:, 2:] - inside[:, :2]).min(1, initial=np.inf) >= _LEAST_PX
-    )
-    inside = inside[kept]
+    return _varied(rng, picture, inside, _share(inside / factor, boxes), strength)
+
+
+def _varied(
+    rng: np.random.Generator, picture: Image, boxes: Boxes, seen: Boxes, strength: Strength
+) -> tuple[Image, Boxes]:
+    """Return a part, mirrored or not and relit, with its boxes of which enough is seen; `seen` (M,) are the shares."""
+    boxes = boxes[(seen >= _LEAST_SEEN) & ((boxes[:, 2:] - boxes[:, :2]).min(1, initial=np.inf) >= _LEAST_PX)]
     if rng.random() < 0.5:
-        picture, inside = picture[:, ::-1], _mirrored(inside, size_px[0])
+        width = picture.shape[1]
+        picture = picture[:, ::-1]
+        boxes = np.stack([width - boxes[:, 2], boxes[:, 1], width - boxes[:, 0], boxes[:, 3]], axis=1)
     if strength.colour:
         picture = _relit(rng, picture)
-    return np.ascontiguousarray(picture), inside
-
-
-def _mirrored(boxes: Boxes, width: int) -> Boxes:
-    return np.stack([width - boxes[:, 2], boxes[:, 1], width - boxes[:, 0], boxes[:, 3]], axis=1)
+    return np.ascontiguousarray(picture), boxes
 
 
 def _share(inside: Boxes, boxes: Boxes) -> Boxes:

@@ -1,10 +1,11 @@
-"""What the camera's tests share: pictures, recordings made here, an HTTP server that misbehaves, a machine's tree."""
+"""What the camera's tests share: pictures, recordings and their playing, an HTTP server that misbehaves, a machine."""
 
 import socket
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,6 +13,9 @@ import numpy.typing as npt
 import pytest
 
 from vergence_camera.fake_machine import FakeMachine
+from vergence_camera.frame import Frame, ModeRequest
+from vergence_camera.sources.recordings import open_recording
+from vergence_camera.sources.replay import Replay
 
 Pixels = npt.NDArray[np.uint8]
 
@@ -50,6 +54,49 @@ def mjpeg_avi(tmp_path: Path) -> Path:
         writer.write(textured(number, 320, 240))
     writer.release()
     return path
+
+
+class FakeTime:
+    """A clock that only sleeping moves."""
+
+    def __init__(self) -> None:
+        self.ns = 1_000_000_000
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    def sleep(self, seconds: float) -> None:
+        self.ns += round(seconds * 1e9)
+
+
+@pytest.fixture
+def clock() -> FakeTime:
+    return FakeTime()
+
+
+@pytest.fixture
+def replay(clock: FakeTime) -> Callable[..., Replay]:
+    """A maker of recordings that play by `clock`."""
+
+    def make(path: Path, request: ModeRequest | None = None, **options: Any) -> Replay:
+        recording = open_recording(path)
+        return Replay(recording, request or ModeRequest(), sleep=clock.sleep, now_ns=clock.now_ns, **options)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def frames_of() -> Callable[[Replay, int], Iterator[Frame]]:
+    """The next frames of a recording."""
+
+    def take(source: Replay, count: int) -> Iterator[Frame]:
+        while count:
+            frame = source.read(0.1)
+            if frame is not None:
+                count -= 1
+                yield frame
+
+    return take
 
 
 @pytest.fixture

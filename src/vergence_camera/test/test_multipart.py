@@ -1,7 +1,6 @@
 """The parser of multipart bodies, as cameras write them."""
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -10,7 +9,6 @@ from hypothesis import strategies as st
 from vergence_camera.sources.multipart import MultipartParser, boundary_of
 
 Make = Callable[..., bytes]
-Serve = Callable[[Callable[[Any], None]], Any]
 
 
 @pytest.mark.parametrize(

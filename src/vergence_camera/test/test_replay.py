@@ -4,6 +4,7 @@ import itertools
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -21,40 +22,11 @@ from vergence_camera.frame import Clock, Encoding, Frame, ModeRequest
 from vergence_camera.sources.recordings import AviRecording, FolderRecording, open_recording
 from vergence_camera.sources.replay import Replay
 
-
-class FakeTime:
-    """A clock that only sleeping moves."""
-
-    def __init__(self) -> None:
-        self.ns = 1_000_000_000
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep(self, seconds: float) -> None:
-        self.ns += round(seconds * 1e9)
+Play = Callable[..., Replay]
+Take = Callable[[Replay, int], Iterator[Frame]]
 
 
-def replay(path: Path, request: ModeRequest | None = None, clock: FakeTime | None = None, **options: object) -> Replay:
-    clock = clock or FakeTime()
-    return Replay(
-        open_recording(path),
-        request or ModeRequest(),
-        sleep=clock.sleep,
-        now_ns=clock.now_ns,
-        **options,  # type: ignore[arg-type]
-    )
-
-
-def frames_of(source: Replay, count: int) -> Iterator[Frame]:
-    while count:
-        frame = source.read(0.1)
-        if frame is not None:
-            count -= 1
-            yield frame
-
-
-def test_an_avi_passes_its_bytes_through_at_its_own_rate(mjpeg_avi: Path) -> None:
+def test_an_avi_passes_its_bytes_through_at_its_own_rate(mjpeg_avi: Path, replay: Play, frames_of: Take) -> None:
     source = replay(mjpeg_avi)
     assert str(source.open()) == "MJPG 320x240 at 25 Hz"
     content = mjpeg_avi.read_bytes()
@@ -65,14 +37,14 @@ def test_an_avi_passes_its_bytes_through_at_its_own_rate(mjpeg_avi: Path) -> Non
 
 
 @pytest.mark.parametrize("rate_hz", [5.0, 100.0])
-def test_another_rate_may_be_asked_for(mjpeg_avi: Path, rate_hz: float) -> None:
+def test_another_rate_may_be_asked_for(mjpeg_avi: Path, rate_hz: float, replay: Play, frames_of: Take) -> None:
     source = replay(mjpeg_avi, rate_hz=rate_hz)
     assert source.open().rate_hz == rate_hz
     frames = list(frames_of(source, 5))
     assert (frames[-1].time_ns - frames[0].time_ns) * 1e-9 == pytest.approx(4.0 / rate_hz)
 
 
-def test_loops_without_a_break_in_sequence_or_rate(mjpeg_avi: Path) -> None:
+def test_loops_without_a_break_in_sequence_or_rate(mjpeg_avi: Path, replay: Play, frames_of: Take) -> None:
     source = replay(mjpeg_avi)
     source.open()
     frames = list(frames_of(source, 25))
@@ -81,7 +53,7 @@ def test_loops_without_a_break_in_sequence_or_rate(mjpeg_avi: Path) -> None:
     assert {b.time_ns - a.time_ns for a, b in itertools.pairwise(frames)} == {40_000_000}
 
 
-def test_ends_when_it_is_to_be_played_once(mjpeg_avi: Path) -> None:
+def test_ends_when_it_is_to_be_played_once(mjpeg_avi: Path, replay: Play, frames_of: Take) -> None:
     source = replay(mjpeg_avi, loop=False)
     source.open()
     assert len(list(frames_of(source, 10))) == 10
@@ -90,9 +62,8 @@ def test_ends_when_it_is_to_be_played_once(mjpeg_avi: Path) -> None:
             list(frames_of(source, 1))
 
 
-def test_a_long_hold_up_does_not_make_it_race(mjpeg_avi: Path) -> None:
-    clock = FakeTime()
-    source = replay(mjpeg_avi, clock=clock, catch_up_s=0.25)
+def test_a_long_hold_up_does_not_make_it_race(mjpeg_avi: Path, replay: Play, frames_of: Take, clock: Any) -> None:
+    source = replay(mjpeg_avi, catch_up_s=0.25)
     source.open()
     list(frames_of(source, 2))
     clock.sleep(3.0)
@@ -101,7 +72,7 @@ def test_a_long_hold_up_does_not_make_it_race(mjpeg_avi: Path) -> None:
     assert following.time_ns - late.time_ns == 40_000_000
 
 
-def test_reopening_begins_anew(mjpeg_avi: Path) -> None:
+def test_reopening_begins_anew(mjpeg_avi: Path, replay: Play, frames_of: Take) -> None:
     source = replay(mjpeg_avi)
     source.open()
     first, *_ = frames_of(source, 4)
@@ -111,13 +82,13 @@ def test_reopening_begins_anew(mjpeg_avi: Path) -> None:
     source.close()
 
 
-def test_size_mismatch_names_both(mjpeg_avi: Path) -> None:
+def test_size_mismatch_names_both(mjpeg_avi: Path, replay: Play) -> None:
     with pytest.raises(ModeMismatchError, match=r"640x480.*320x240") as caught:
         replay(mjpeg_avi, ModeRequest("MJPG", 640, 480)).open()
     assert caught.value.permanent
 
 
-def test_a_truncated_avi_is_said_each_round(mjpeg_avi: Path) -> None:
+def test_a_truncated_avi_is_said_each_round(mjpeg_avi: Path, replay: Play) -> None:
     content = mjpeg_avi.read_bytes()
     mjpeg_avi.write_bytes(content[: len(content) * 2 // 3])
     source = replay(mjpeg_avi)
@@ -132,7 +103,9 @@ def test_a_truncated_avi_is_said_each_round(mjpeg_avi: Path) -> None:
     assert good > 8 * faults / 2
 
 
-def test_a_folder_in_natural_order_with_jpegs_untouched(tmp_path: Path, make_jpeg: Callable[..., bytes]) -> None:
+def test_a_folder_in_natural_order_with_jpegs_untouched(
+    tmp_path: Path, make_jpeg: Callable[..., bytes], replay: Play, frames_of: Take
+) -> None:
     for number in (1, 2, 10):
         (tmp_path / f"img{number}.jpg").write_bytes(make_jpeg(number, 64, 48))
     (tmp_path / "notes.txt").write_text("no picture")
@@ -142,7 +115,9 @@ def test_a_folder_in_natural_order_with_jpegs_untouched(tmp_path: Path, make_jpe
     assert [frame.data for frame in frames_of(source, 3)] == [make_jpeg(n, 64, 48) for n in (1, 2, 10)]
 
 
-def test_a_folder_of_png_is_decoded_colour_and_grey(tmp_path: Path, make_pixels: Callable[..., np.ndarray]) -> None:
+def test_a_folder_of_png_is_decoded_colour_and_grey(
+    tmp_path: Path, make_pixels: Callable[..., np.ndarray], replay: Play, frames_of: Take
+) -> None:
     colour = make_pixels(0, 64, 48)
     cv2.imwrite(str(tmp_path / "a.png"), colour)
     cv2.imwrite(str(tmp_path / "b.png"), colour[:, :, 1])
@@ -154,7 +129,9 @@ def test_a_folder_of_png_is_decoded_colour_and_grey(tmp_path: Path, make_pixels:
     assert np.array_equal(np.asarray(second.data), colour[:, :, 1])
 
 
-def test_a_picture_of_another_size_is_dropped(tmp_path: Path, make_jpeg: Callable[..., bytes]) -> None:
+def test_a_picture_of_another_size_is_dropped(
+    tmp_path: Path, make_jpeg: Callable[..., bytes], replay: Play, frames_of: Take
+) -> None:
     for name, size in (("a", (64, 48)), ("b", (32, 24)), ("c", (64, 48))):
         (tmp_path / f"{name}.jpg").write_bytes(make_jpeg(0, *size))
     source = replay(tmp_path)
@@ -175,7 +152,9 @@ def test_a_picture_of_another_size_is_dropped(tmp_path: Path, make_jpeg: Callabl
     ],
     ids=["missing", "empty folder", "no video", "one picture"],
 )
-def test_unusable_recordings(tmp_path: Path, make: Callable[[Path], Path], error: type[Exception]) -> None:
+def test_unusable_recordings(
+    tmp_path: Path, make: Callable[[Path], Path], error: type[Exception], replay: Play
+) -> None:
     with pytest.raises(error):
         replay(make(tmp_path)).open()
 

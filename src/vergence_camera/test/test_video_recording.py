@@ -7,45 +7,13 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence_camera.errors import (
-    ReplayEndedError,
-    TruncatedFileError,
-)
+from vergence_camera.errors import ReplayEndedError, TruncatedFileError
 from vergence_camera.frame import Encoding, Frame, ModeRequest
 from vergence_camera.sources.recordings import VideoRecording, open_recording
 from vergence_camera.sources.replay import Replay
 
-
-class FakeTime:
-    """A clock that only sleeping moves."""
-
-    def __init__(self) -> None:
-        self.ns = 1_000_000_000
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def sleep(self, seconds: float) -> None:
-        self.ns += round(seconds * 1e9)
-
-
-def replay(path: Path, request: ModeRequest | None = None, clock: FakeTime | None = None, **options: object) -> Replay:
-    clock = clock or FakeTime()
-    return Replay(
-        open_recording(path),
-        request or ModeRequest(),
-        sleep=clock.sleep,
-        now_ns=clock.now_ns,
-        **options,  # type: ignore[arg-type]
-    )
-
-
-def frames_of(source: Replay, count: int) -> Iterator[Frame]:
-    while count:
-        frame = source.read(0.1)
-        if frame is not None:
-            count -= 1
-            yield frame
+Play = Callable[..., Replay]
+Take = Callable[[Replay, int], Iterator[Frame]]
 
 
 class BitWriter:
@@ -115,7 +83,9 @@ def h264_file(tmp_path: Path, make_pixels: Callable[..., np.ndarray]) -> Path:
     return path
 
 
-def test_h264_is_decoded(h264_file: Path, make_pixels: Callable[..., np.ndarray]) -> None:
+def test_h264_is_decoded(
+    h264_file: Path, make_pixels: Callable[..., np.ndarray], replay: Play, frames_of: Take
+) -> None:
     source = replay(h264_file, ModeRequest("MJPG", 160, 96), loop=False)
     mode = source.open()
     assert (mode.pixel_format, mode.width_px, mode.height_px, mode.rate_hz) == ("H264", 160, 96, 25.0)
@@ -129,7 +99,7 @@ def test_h264_is_decoded(h264_file: Path, make_pixels: Callable[..., np.ndarray]
         list(frames_of(source, 1))
 
 
-def test_h264_loops(h264_file: Path) -> None:
+def test_h264_loops(h264_file: Path, replay: Play, frames_of: Take) -> None:
     source = replay(h264_file)
     source.open()
     frames = list(frames_of(source, 17))
@@ -138,7 +108,7 @@ def test_h264_loops(h264_file: Path) -> None:
 
 @pytest.mark.parametrize(("code", "suffix"), [("mp4v", ".mp4"), ("VP80", ".mkv"), ("XVID", ".avi")])
 def test_other_containers_are_decoded(
-    tmp_path: Path, make_pixels: Callable[..., np.ndarray], code: str, suffix: str
+    tmp_path: Path, make_pixels: Callable[..., np.ndarray], code: str, suffix: str, replay: Play, frames_of: Take
 ) -> None:
     path = tmp_path / f"clip{suffix}"
     writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*code), 20.0, (160, 96))
@@ -153,7 +123,9 @@ def test_other_containers_are_decoded(
     assert [np.asarray(frame.data).shape for frame in frames_of(source, 6)] == [(96, 160, 3)] * 6
 
 
-def test_a_truncated_video_is_said(tmp_path: Path, make_pixels: Callable[..., np.ndarray]) -> None:
+def test_a_truncated_video_is_said(
+    tmp_path: Path, make_pixels: Callable[..., np.ndarray], replay: Play, frames_of: Take
+) -> None:
     path = tmp_path / "clip.avi"
     writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"XVID"), 20.0, (160, 96))
     for number in range(40):

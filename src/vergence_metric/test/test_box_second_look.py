@@ -72,8 +72,8 @@ def test_a_thing_seen_again_gets_finer_sides(x, y, width, height, off):
 
 
 def test_the_look_with_the_finer_pixels_counts_more():
-    box, size = np.array([100.0, 100, 160, 160]), (SIZE[0], SIZE[1])
-    own = Window.about(box, size).scale
+    box = np.array([100.0, 100, 160, 160])
+    own = Window.about(box, SIZE).scale
     coarse, alike, fine = (
         look_again(picture(box + 5.0), box[None], np.array([0.8]), np.array([0]), scale, bright)[0][0]
         for scale in (1e4 * own, own, 1e-4 * own)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vergence_rig.geometry import gaze_for_point
 from vergence_rig.rig import default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 from vergence_servo.gaze.controller import GazeController
@@ -43,7 +44,8 @@ class Trial:
 
     def __post_init__(self) -> None:
         rig = default_rig().with_servos(self.servo)
-        start = fixating(self.target(0.0)) if self.start_rad is None else self.start_rad
+        fixating = gaze_for_point(self.target(0.0), rig.baseline_m).as_dict()
+        start = fixating if self.start_rad is None else self.start_rad
         head = FakeHead(rig, self.target, self.seeing, self.seed, start, mistaken=self.mistaken)
         controller = GazeController(rig, GazeParameters(law=self.law), CONTROL_TICKS * TICK_S)
         arrived: list[Any] = []
@@ -79,16 +81,6 @@ class Trial:
 def place(distance_m: float, azimuth_deg: float) -> np.ndarray:
     azimuth = math.radians(azimuth_deg)
     return distance_m * np.array([math.cos(azimuth), math.sin(azimuth), 0.05])
-
-
-def fixating(point_m: np.ndarray) -> dict[str, float]:
-    x, y, z = point_m
-    half, forward = 0.5 * default_rig().baseline_m, math.hypot(x, z)
-    return {
-        "pan_left": math.atan2(y - half, forward),
-        "pan_right": math.atan2(y + half, forward),
-        "tilt": math.atan2(-z, x),
-    }
 
 
 def jump(before: np.ndarray, after: np.ndarray) -> Place:

@@ -4,13 +4,11 @@ What is nearer than two metres and in reach of a gaze (35 degrees to the sides, 
 """
 
 import math
-from collections.abc import Callable
 
-import cv2
 import numpy as np
 
 from vergence_sim.model_builder import ModelBuilder
-from vergence_sim.pictures import book_cover, book_spines, painting, poster, screen, window_view
+from vergence_sim.pictures import book_cover, book_spines, screen, window_view
 from vergence_sim.surfaces import (
     Colour,
     Image,
@@ -27,13 +25,12 @@ from vergence_sim.surfaces import (
     wallpaper,
     wood,
 )
+from vergence_sim.walls import PX_PER_M, Face, wall
 
 FRONT_M, BACK_M, SIDE_M, HEIGHT_M = 3.8, -1.2, 2.5, 2.8
 """The walls' distances along x and to both sides, and the ceiling's height."""
 
-_PX_PER_M = 330
 _Triple = tuple[float, float, float]
-_Face = Callable[[np.random.Generator, tuple[int, int]], Image]
 
 
 class Room:
@@ -59,7 +56,7 @@ class Room:
     def shell(self) -> None:
         """Put in walls, floor, ceiling and a rug."""
         rng, length, middle = np.random.default_rng([self._seed, 6]), FRONT_M - BACK_M, 0.5 * (FRONT_M + BACK_M)
-        kinds: list[_Face] = [
+        kinds: list[Face] = [
             lambda r, s: plaster(r, s, muted(r, 150, 200, 12)),
             lambda r, s: bricks(r, s, (75, 95, 150)),
             lambda r, s: wallpaper(r, s, muted(r, 150, 205, 14)),
@@ -67,7 +64,7 @@ class Room:
         ]
         order = [0, *(1 + rng.permutation(3)).tolist()]
         half = HEIGHT_M / 2
-        walls: tuple[tuple[str, float, _Triple, _Triple, list[_Face]], ...] = (
+        walls: tuple[tuple[str, float, _Triple, _Triple, list[Face]], ...] = (
             ("wall_front", 2 * SIDE_M, (FRONT_M, 0.0, half), (math.pi / 2, -math.pi / 2, 0.0), [window_view]),
             ("wall_left", length, (middle, SIDE_M, half), (math.pi / 2, 0.0, 0.0), []),
             ("wall_right", length, (middle, -SIDE_M, half), (-math.pi / 2, 0.0, math.pi), []),
@@ -76,9 +73,9 @@ class Room:
         for (name, wide, centre, turn, first), kind in zip(walls, order, strict=True):
             self._materials += 1
             if self._builder.textured:
-                self._builder.flat(name, _wall(self._generator(), wide, kinds[kind], first))
+                self._builder.flat(name, wall(self._generator(), (wide, HEIGHT_M), kinds[kind], first))
             self._builder.add(self._builder.shape("plane", centre, (wide / 2, half, 1), name, turn, name))
-        size = (round(2 * SIDE_M * _PX_PER_M), round(length * _PX_PER_M))
+        size = (round(2 * SIDE_M * PX_PER_M), round(length * PX_PER_M))
         ground = self._flat(lambda r, _: wood(r, size, (60, 98, 138), planks=24))
         above = self._flat(lambda r, _: plaster(r, (700, 700), (196, 200, 202)))
         self._builder.add(
@@ -243,7 +240,7 @@ class Room:
     ) -> None:
         self._builder.add(self._builder.shape(kind, centre, size, material, turn))
 
-    def _wrap(self, face: _Face, size_px: int = 192) -> str:
+    def _wrap(self, face: Face, size_px: int = 192) -> str:
         self._materials += 1
         name = f"material{self._materials}"
         if self._builder.textured:
@@ -251,7 +248,7 @@ class Room:
             self._builder.wrap(name, [face(rng, (size_px, size_px)) for _ in range(6)])
         return name
 
-    def _flat(self, face: _Face) -> str:
+    def _flat(self, face: Face) -> str:
         self._materials += 1
         name = f"material{self._materials}"
         if self._builder.textured:
@@ -261,42 +258,6 @@ class Room:
     def _generator(self) -> np.random.Generator:
         # Of each texture's own, so that an untextured room is furnished alike.
         return np.random.default_rng([self._seed, 1, self._materials])
-
-
-def _wall(rng: np.random.Generator, wide_m: float, base: _Face, first: list[_Face]) -> Image:
-    """Return a wall with pictures hung on it, their shadows, and the dusk of its corners."""
-    height, width = round(HEIGHT_M * _PX_PER_M), round(wide_m * _PX_PER_M)
-    wall = base(rng, (height, width)).astype(np.float32)
-    taken: list[tuple[int, int, int, int]] = []
-    wanted: list[_Face] = [*first, *(painting if rng.random() < 0.6 else poster for _ in range(9))]
-    for picture in wanted:
-        tall = 1.0 if picture is window_view else float(rng.uniform(0.28, 0.6))
-        across = tall * (1.25 if picture is window_view else float(rng.uniform(0.65, 1.4)))
-        h, w = round(tall * _PX_PER_M), round(across * _PX_PER_M)
-        for _ in range(12):
-            x, y = int(rng.integers(30, width - w - 30)), int(rng.uniform(0.12, 0.6) * height)
-            if y + h < height - 30 and all(
-                x > r + 20 or x + w + 20 < left or y > b + 20 or y + h + 20 < top for left, top, r, b in taken
-            ):
-                taken.append((x, y, x + w, y + h))
-                _hang(wall, picture(rng, (h, w)), x, y)
-                break
-    wall *= _dusk(height, width)[:, :, None]
-    return np.clip(wall, 0, 255).astype(np.uint8)
-
-
-def _hang(wall: np.ndarray, picture: Image, x: int, y: int) -> None:
-    height, width = picture.shape[:2]
-    shade = np.ones(wall.shape[:2], np.float32)
-    cv2.rectangle(shade, (x + 2, y + 4), (x + width + 5, y + height + 9), 0.62, -1)
-    wall *= cv2.GaussianBlur(shade, (0, 0), 4)[:, :, None]
-    wall[y : y + height, x : x + width] = picture
-
-
-def _dusk(height: int, width: int) -> np.ndarray:
-    x = np.minimum(np.arange(width), np.arange(width)[::-1]) / (0.35 * _PX_PER_M)
-    y = np.minimum(np.arange(height), np.arange(height)[::-1]) / (0.35 * _PX_PER_M)
-    return np.asarray((1 - 0.35 * np.exp(-x))[None, :] * (1 - 0.35 * np.exp(-y))[:, None], np.float32)
 
 
 def _continents(rng: np.random.Generator, shape: tuple[int, int]) -> Image:

@@ -1,6 +1,5 @@
 """What the camera node's graph tests share: a machine of fake webcams, and frames that arrive when told."""
 
-import itertools
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -65,15 +64,13 @@ class Listener:
         return self.messages
 
 
-def _push_until(graph: Any, camera: FakeCamera, condition: Callable[[], bool], what: str, data: bytes = b"") -> None:
+def _push_until(graph: Any, camera: FakeCamera, condition: Callable[[], bool], what: str) -> None:
     """Let frames arrive, one after the other was taken, until a condition holds."""
-    data = data or _jpeg(0)
-    numbers = itertools.count()
+    picture = _jpeg(0)
 
     def pushed() -> bool:
-        next(numbers)
         if len(camera.queued) == 4:
-            camera.push(data)
+            camera.push(picture)
         return condition()
 
     graph.wait_until(pushed, what)
