@@ -32,6 +32,7 @@ class JointHistory:
         self._half_play = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
         self._speed = np.array([servo.speed_rad_s for servo in servos])
         self._latency = np.array([servo.command_latency_s for servo in servos])
+        self._longest_latency_s = float(self._latency.max())
         self._commands_s: deque[float] = deque(maxlen=_MOST_COMMANDS)
         self._stamps: list[float] = []
         self._reported: list[Array] = []
@@ -145,7 +146,7 @@ class JointHistory:
     def _onset_s(self, begin_s: float, end_s: float) -> Array | None:
         """Return when each joint (3,) began to turn between two reports, if a command tells that."""
         for command_s in reversed(self._commands_s):
-            if command_s + float(self._latency.max()) < begin_s:
+            if command_s + self._longest_latency_s < begin_s:
                 return None
             onset_s = command_s + self._latency
             if (onset_s < end_s).any():

@@ -24,7 +24,6 @@ class PredictiveLaw:
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
         self._inverse = ServoInverse(rig, parameters.hold_tolerance_rad, parameters.dead_band_trust)
-
         self._aim: Array | None = None
 
     def reset(self) -> None:
