@@ -106,6 +106,13 @@ def test_a_target_that_jumps_is_followed_at_once(servo: ServoSpec, after: np.nda
     assert trial.settled_s(1.5, 0.3 if servo is IDEAL else 0.75) < soon_s
 
 
+def test_saccades_that_land_at_rest_end_there_though_the_target_moves_on() -> None:
+    trial = Trial(lambda time_s: place(0.8, 20.0 * (min(time_s, 4.0) - 2.0)), FRAME_RATE, law="pd_bangbang")
+    saccades = "".join("s" if phase is Phase.SACCADE else " " for phase in trial.phases).split()
+    assert len(saccades) >= 4
+    assert np.median([len(saccade) for saccade in saccades]) * CONTROL_TICKS * TICK_S < 0.2
+
+
 @pytest.mark.parametrize("click", [False, True], ids=["by_boxes", "by_track"])
 @pytest.mark.parametrize("seed", range(4))
 def test_a_target_that_passes_before_another_is_kept(click: bool, seed: int) -> None:

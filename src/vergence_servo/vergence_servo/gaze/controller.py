@@ -247,7 +247,7 @@ class GazeController:
             has_target=has_target,
             unseen_s=self._seen.unseen_s(view.now_s),
             residual_rad=float(np.abs(residual).max()),
-            eyes_still=self._seen.eyes_still(view.now_s, view.commanded_rad),
+            eyes_still=self._seen.eyes_still(view.now_s, view.commanded_rad, self._law.lands_at_rest),
             travel_s=float((np.abs(residual) / view.speed_rad_s).max()),
             verged=self._seen.judge.verged,
             may_search=tracking.class_name is not None or tracking.takes_stream or lost_s > self._p.search_after_s,

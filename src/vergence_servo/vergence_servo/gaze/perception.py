@@ -130,9 +130,9 @@ class Perception:
         images_come = now_s - self.image_s < self._p.no_images_s
         return max(0.0, (self.image_s if images_come else now_s) - seen_s)
 
-    def eyes_still(self, now_s: float, command_rad: Array) -> bool:
-        """Tell whether the joints rest where they were commanded (3,), or go along with the target."""
-        along = self.tracking.joint_rates_rad_s(now_s)
+    def eyes_still(self, now_s: float, command_rad: Array, at_rest: bool = False) -> bool:
+        """Tell whether the joints rest where they were commanded (3,), or go along with the target unless `at_rest`."""
+        along = np.zeros(3) if at_rest else self.tracking.joint_rates_rad_s(now_s)
         slow = self.history.speed_within(self.history.newest_s - 0.015, now_s, along) < _STILL_SPEED_RAD_S
         return slow and self.off_rad(command_rad) < _ARRIVED_RAD + _COMMANDED_AHEAD_S * float(np.abs(along).max())
 

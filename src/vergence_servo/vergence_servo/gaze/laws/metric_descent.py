@@ -29,6 +29,7 @@ class MetricDescentLaw:
 
     name = "metric_descent"
     unsigned = True
+    lands_at_rest = False
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
         self._inverse = ServoInverse(rig, parameters.hold_tolerance_rad, parameters.dead_band_trust)

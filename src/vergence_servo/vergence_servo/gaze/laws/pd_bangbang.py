@@ -29,6 +29,7 @@ class PdBangbangLaw:
 
     name = "pd_bangbang"
     unsigned = False
+    lands_at_rest = True
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
         self.reset()

@@ -39,6 +39,7 @@ class PidPursuitLaw:
 
     name = "pid_pursuit"
     unsigned = False
+    lands_at_rest = False
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
         self._inverse = ServoInverse(rig, parameters.hold_tolerance_rad, parameters.dead_band_trust)

@@ -21,6 +21,7 @@ class PredictiveLaw:
 
     name = "predictive"
     unsigned = False
+    lands_at_rest = False
 
     def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
         self._inverse = ServoInverse(rig, parameters.hold_tolerance_rad, parameters.dead_band_trust)

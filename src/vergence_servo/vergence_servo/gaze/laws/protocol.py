@@ -89,6 +89,9 @@ class Law(Protocol):
     unsigned: bool
     """True if the law finds the vergence without signed disparity; `remaining_rad` then stands in for the error."""
 
+    lands_at_rest: bool
+    """True if a saccade ends where it was begun for, False if the eyes go on with a target that moves."""
+
     def reset(self) -> None:
         """Begin anew: a new target, or the eyes were moved by something else."""
 
