@@ -215,7 +215,7 @@ def crossings(count: int, given: str = "boxes", seed: int = 10) -> list[Scenario
             Scenario(
                 target,
                 fixating(target(0.0)),
-                CROSSED_S + 2.5,
+                CROSSED_S + 3.0,
                 given,
                 seed=1000 * seed + i,
                 mistaken={
