@@ -187,7 +187,7 @@ class CameraNode(Node):
     def _end(self) -> None:
         """Let the last frames arrive, then end the process: a recording that is played once is a finite task."""
         for publisher in self._publishers_of_frames:
-            publisher.wait_for_all_acked(Duration(seconds=1))
+            publisher.wait_for_all_acked(Duration(seconds=3))
         self.context.try_shutdown()
 
     def _say(self, text: str, bad: bool) -> None:
