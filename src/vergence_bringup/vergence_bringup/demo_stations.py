@@ -103,7 +103,7 @@ def cube_told_apart() -> Station:
 
 
 def stations(baseline_m: float, short: bool = False) -> list[Station]:
-    """Return the demo's stations in order; the short demo has three that rest."""
+    """Return the demo's stations in order; the short demo has the paper's, one that is free, and the one that moves."""
     free = [
         Station("cube_near_left", "0.4 m, 10 degrees left", "cube", _at(0.4, 10.0, 0.0)),
         Station("cube_right_up", "0.7 m, 20 degrees right, 10 up", "cube", _at(0.7, -20.0, 10.0)),
@@ -119,5 +119,5 @@ def stations(baseline_m: float, short: bool = False) -> list[Station]:
         hold_s=7.0,
     )
     if short:
-        return [cube_held(baseline_m), free[1], free[2]]
+        return [cube_held(baseline_m), free[1], moving]
     return [cube_held(baseline_m), marker_80_80(), *free, cube_told_apart(), moving]
