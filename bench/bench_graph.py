@@ -128,9 +128,13 @@ class Eye:
         return sent
 
     def end(self) -> None:
-        """End it whatever it does."""
-        self._process.kill()
-        self._process.wait()
+        """Let it end by itself, as it does once its input ends; one killed may take the shared memory's users with it."""
+        self._to.close()
+        try:
+            self._process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
 
 
 @contextmanager
