@@ -128,7 +128,7 @@ class Eye:
         return sent
 
     def end(self) -> None:
-        """Let it end by itself, as it does once its input ends; one killed may take the shared memory's users with it."""
+        """Let it end by itself, as it does once its input ends; one killed may crash who shares memory with it."""
         self._to.close()
         try:
             self._process.wait(timeout=5.0)
