@@ -72,6 +72,31 @@ def test_a_second_sighting_of_a_pair_does_not_count_as_a_second_pair() -> None:
         assert not judging.see_pair(1.0, 1.06, SMALL_RAD, True, True, 0.05)
 
 
+def test_while_verged_a_pair_counts_by_the_worst_that_is_told_of_it() -> None:
+    judging = judge()
+    judging.see_contrast(1.0, GOOD, False, 1.06)
+    assert judging.see_pair(1.0, 1.06, SMALL_RAD, True, True, SURE)
+    for i in range(1, 5):
+        stamp_s = 1.0 + i * FRAME_S
+        judging.see_contrast(stamp_s, GOOD, False, stamp_s + 0.06)
+        assert judging.see_pair(
+            stamp_s, stamp_s + 0.06, SMALL_RAD, True, True
+        )  # the fovea, which tells the depth alone
+        verged = judging.see_pair(stamp_s, stamp_s + 0.07, SMALL_RAD, True, True, aside_rad=0.03)
+        assert verged is (i < 4)
+        assert judging.see_pair(stamp_s, stamp_s + 0.08, SMALL_RAD, True, True, aside_rad=0.03) is verged
+
+
+def test_a_bad_sighting_of_the_pair_that_made_it_verged_is_one_bad_pair() -> None:
+    judging = judge()
+    for i in range(6):
+        judging.see_contrast(1.0 + i * FRAME_S, BAD, False, 1.06 + i * FRAME_S)
+        judging.see_pair(1.0 + i * FRAME_S, 1.06 + i * FRAME_S, SMALL_RAD, True, True)
+    judging.see_contrast(2.0, GOOD, False, 2.06)
+    assert judging.see_pair(2.0, 2.06, SMALL_RAD, True, True, SURE)
+    assert judging.see_pair(2.0, 2.07, SMALL_RAD, True, True, aside_rad=0.03)
+
+
 @pytest.mark.parametrize("missing", ["steady", "resting"])
 def test_certainty_of_one_pair_is_no_substitute_for_rest(missing: str) -> None:
     judging = judge()

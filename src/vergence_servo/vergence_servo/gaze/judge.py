@@ -37,7 +37,7 @@ class VergedJudge:
         self._good = self._bad = 0
         self._pair: PairVerdict | None = None
         self._last_pair_s = -math.inf
-        self._good_before = 0
+        self._good_before = self._bad_before = 0
         self.unresolved_rad = 0.0
         """Error that the servos cannot mend, beyond what the limits were made for: it keeps nobody from `verged`."""
         self.dead_band_rad = 0.0
@@ -50,7 +50,8 @@ class VergedJudge:
 
     def restart(self, reason: str = "new target") -> None:
         """Not verged until shown again."""
-        self.verged, self._good, self._bad, self._good_before = False, 0, 0, 0
+        self.verged = False
+        self._good = self._bad = self._good_before = self._bad_before = 0
         self._pair = None
         self.since_s = math.nan
         self.reason = reason
@@ -96,7 +97,8 @@ class VergedJudge:
         """Judge one pair in which the target was measured; returns `verged`.
 
         Args:
-            stamp_s: the pair's stamp; every pair counts once, by the last that is told of it until it is verged.
+            stamp_s: the pair's stamp; every pair counts once, by the last that is told of it until it is verged, and
+                by the worst from then on: the fovea tells nothing of a direction.
             now_s: the present.
             error_rad: the vergence error in that pair.
             steady: whether the estimate is certain enough.
@@ -105,10 +107,12 @@ class VergedJudge:
             aside_rad: the largest error of a gaze direction in that pair.
             placed: whether the target itself was seen lately, not only something at its depth.
         """
-        if not stamp_s >= self._last_pair_s or (stamp_s == self._last_pair_s and (self.verged or self._pair is None)):
+        if not stamp_s >= self._last_pair_s or (stamp_s == self._last_pair_s and self._pair is None):
             return self.verged
         if stamp_s > self._last_pair_s:
-            self._last_pair_s, self._good_before = stamp_s, self._good
+            self._last_pair_s, self._good_before, self._bad_before = stamp_s, self._good, self._bad
+        elif self.verged and self._bad > self._bad_before:
+            return self.verged  # it is bad already
         self._pair = PairVerdict(stamp_s, error_rad, aside_rad, steady, resting, doubt, placed)
         if self.verged:
             self._stay(self._pair, now_s)
@@ -125,11 +129,11 @@ class VergedJudge:
             self._is_own_contrast(pair) or not self._heeds_contrast(now_s)
         )
         if good and (certain or self._good >= self._p.verged_pairs):
-            self.verged, self.since_s, self._bad = True, now_s, 0
+            self.verged, self.since_s, self._bad, self._bad_before = True, now_s, 0, 0
 
     def _stay(self, pair: PairVerdict, now_s: float) -> None:
         good = self._within(pair, now_s, (self._p.verged_leave_rad,) * 2, self._p.contrast_leave)
-        self._bad = 0 if good else self._bad + 1
+        self._bad = 0 if good else self._bad_before + 1
         if self._bad >= self._p.unverged_pairs:
             self.verged, self.since_s, self._good = False, math.nan, 0
 
