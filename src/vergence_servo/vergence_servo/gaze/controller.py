@@ -207,6 +207,8 @@ class GazeController:
         if phase in (Phase.LOST, Phase.IDLE):
             self._seen.judge.restart("the target is lost")
             return _UNKNOWN
+        if phase is Phase.SACCADE and self._seen.judge.verged:
+            self._seen.judge.restart("the eyes are on their way to the target")
         if self._seen.tracking.disagreement:
             self._phases.enter(Phase.VERGE, "estimators disagree: holding still", now_s)
             return _UNKNOWN

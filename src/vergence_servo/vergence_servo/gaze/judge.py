@@ -9,6 +9,7 @@ _CONTRAST_AGE_S = 0.5
 _SEEN_AGE_S = 1.0
 _PAIR_MATCH_S = 0.08
 _SAME_PAIR_S = 0.012
+_LONG_ON_IT_S, _SEEN_LATELY_S = 0.4, 0.4
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,7 @@ class VergedJudge:
         self._pair: PairVerdict | None = None
         self._last_pair_s = -math.inf
         self._good_before = self._bad_before = 0
+        self._place_s, self._on_it_since_s = -math.inf, math.inf
         self.unresolved_rad = 0.0
         """Error that the servos cannot mend, beyond what the limits were made for: it keeps nobody from `verged`."""
         self.dead_band_rad = 0.0
@@ -53,6 +55,7 @@ class VergedJudge:
         self.verged = False
         self._good = self._bad = self._good_before = self._bad_before = 0
         self._pair = None
+        self._on_it_since_s = math.inf
         self.since_s = math.nan
         self.reason = reason
 
@@ -74,6 +77,19 @@ class VergedJudge:
         pair = self._pair
         if pair is not None and not self.verged and self._is_own_contrast(pair):
             self._enter(pair, now_s)
+
+    def see_place(self, stamp_s: float, error_rad: float, aside_rad: float) -> None:
+        """Take where the target itself was seen in a pair, however late that is told; see `see_pair`."""
+        if not stamp_s > self._place_s:
+            return
+        self._place_s = stamp_s
+        on_it = abs(error_rad) <= self.enter_rad and abs(aside_rad) <= self.aside_enter_rad
+        self._on_it_since_s = min(self._on_it_since_s, stamp_s) if on_it else math.inf
+
+    def has_been_on_it(self, now_s: float) -> bool:
+        """Tell whether the target itself was on the axes in every pair for a while, up to now."""
+        lately = now_s - self._place_s < _SEEN_LATELY_S
+        return lately and self._place_s - self._on_it_since_s >= _LONG_ON_IT_S
 
     def exposure_for(self, stamp_s: float, now_s: float) -> float:
         """Return when a target that no image gave is to be judged: at the newest image that counts, points are younger.

@@ -205,8 +205,10 @@ class Perception:
         along = float(np.abs(estimate.rates_rad_s).max()) if estimate.moving else 0.0
         sweeping = self.history.speed_within(stamp_s - self._p.settle_s, stamp_s) > along + _SWEEPING_RAD_S
         certain = float(estimate.sigmas_rad[1]) < _STEADY_VERGENCE_RAD
-        # What passed over the target when the pair was exposed is elsewhere by now.
-        there = self._is_there(now_s)
+        if self.tracking.source != "fovea":
+            self.judge.see_place(stamp_s, error, aside)
+        # What passed over the target when the pair was exposed is elsewhere by now; what has stayed on it stays.
+        there = self._is_there(now_s) or self.judge.has_been_on_it(now_s)
         steady = certain and there and not sweeping and not self.tracking.doubtful
         left = 1.0
         # What moves, or may move, can be elsewhere by now: there one pair is never enough.
