@@ -97,6 +97,21 @@ def test_a_bad_sighting_of_the_pair_that_made_it_verged_is_one_bad_pair() -> Non
     assert judging.see_pair(2.0, 2.07, SMALL_RAD, True, True, aside_rad=0.03)
 
 
+def test_it_has_been_on_the_target_once_every_pair_of_a_while_showed_it_there() -> None:
+    judging = judge()
+    for i in range(14):
+        stamp_s = 1.0 + i * FRAME_S
+        judging.see_place(stamp_s, SMALL_RAD, SMALL_RAD)
+        assert i > 10 or not judging.has_been_on_it(stamp_s + 0.06)
+    assert judging.has_been_on_it(stamp_s + 0.06)
+    assert not judging.has_been_on_it(stamp_s + 0.5)  # not seen since
+    judging.see_place(1.1, SMALL_RAD, 0.03)  # told late: what came after it counts
+    assert judging.has_been_on_it(stamp_s + 0.06)
+    judging.see_place(stamp_s + FRAME_S, SMALL_RAD, 0.03)
+    judging.see_place(stamp_s + 2 * FRAME_S, SMALL_RAD, SMALL_RAD)
+    assert not judging.has_been_on_it(stamp_s + 2 * FRAME_S + 0.06)
+
+
 @pytest.mark.parametrize("missing", ["steady", "resting"])
 def test_certainty_of_one_pair_is_no_substitute_for_rest(missing: str) -> None:
     judging = judge()

@@ -106,6 +106,22 @@ def test_a_target_that_jumps_is_followed_at_once(servo: ServoSpec, after: np.nda
     assert trial.settled_s(1.5, 0.3 if servo is IDEAL else 0.75) < soon_s
 
 
+def test_eyes_in_a_saccade_are_not_called_verged() -> None:
+    trial = Trial(jump(place(0.8, 3.0), place(0.8, 18.0)), FRAME_RATE, SG90, until_s=3.0)
+    flying = np.array([phase is Phase.SACCADE for phase in trial.phases])
+    assert flying[trial.time_s > 1.5].any()
+    assert not trial.verged[flying].any()
+    assert trial.verged[trial.time_s > 2.2].all()
+
+
+def test_a_moving_target_that_a_slow_detector_shows_on_the_axes_is_called_verged() -> None:
+    seeing = replace(DETECTOR, box_latency_s=0.17, latency_s=0.12)
+    trial = Trial(lambda time_s: place(0.6, 5.0 * (max(time_s, 0.8) - 2.5)), seeing, SG90, until_s=5.0)
+    late = trial.time_s > 2.5
+    assert trial.verged[late].mean() > 0.6
+    assert trial.error_deg[late & trial.verged].max() < 1.0
+
+
 def test_saccades_that_land_at_rest_end_there_though_the_target_moves_on() -> None:
     trial = Trial(lambda time_s: place(0.8, 20.0 * (min(time_s, 4.0) - 2.0)), FRAME_RATE, law="pd_bangbang")
     saccades = "".join("s" if phase is Phase.SACCADE else " " for phase in trial.phases).split()
