@@ -53,6 +53,15 @@ def test_a_new_track_takes_the_first_box_at_its_word() -> None:
     np.testing.assert_allclose(lock.offset, np.array([-0.5, 0.0]) * DEG, atol=1e-12)
 
 
+def test_a_refused_track_teaches_nothing_any_more() -> None:
+    lock = adopted(PLACE)
+    lock.take(1.0, PLACE)
+    assert lock.place_at(1.0) is not None
+    lock.refuse()
+    assert lock.place_at(1.0) is None
+    assert "not the target" in lock.adopt(1, PLACE, ESTIMATE, 0.07, 0.02)
+
+
 def test_boxes_that_one_eye_alone_saw_teach_nothing() -> None:
     lock = adopted(PLACE)
     lock.take(1.0, moved(0.5, 0.0))

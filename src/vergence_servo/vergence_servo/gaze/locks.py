@@ -34,6 +34,7 @@ class TrackLock:
     def refuse(self) -> None:
         """The track is something else's: do not take it again."""
         self._refused_id, self.track_id = self.track_id, None
+        self._seen.clear()
 
     def adopt(
         self,
