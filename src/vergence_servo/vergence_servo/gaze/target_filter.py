@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from vergence_servo.gaze import jumps
+from vergence_servo.gaze.jumps import RATE_SIGMA_RAD_S
 from vergence_servo.gaze.kalman import TILT, VERGENCE, VERSION, Fit, Kalman, Measurement
 from vergence_servo.gaze.motion import Motion
 
@@ -20,12 +22,12 @@ _EVIDENCE_FADE = 0.8
 _EVIDENCE_TO_MOVE = 7.0
 _EVIDENCE_TO_REST = -2.0
 _EVIDENCE_BOUNDS = (-6.0, 15.0)
+_OF_ONE_MEASUREMENT = (-3.0, 7.5)
 _EVIDENCE_SURE = 11.0
 _SIGNIFICANT_RATE = 9.0
 _COAST_STRAIGHT_S = 0.15
 _COAST_FADE_S = 0.3
 _JUMP_SIGMA_RAD = 0.3
-_RATE_SIGMA_RAD_S = 0.5
 _LONGEST_PREDICTION_S = 2.0
 _LARGEST_VARIANCE = 1.0
 _LATEST_S = 1.0
@@ -126,7 +128,7 @@ class TargetFilter:
         state, whole = np.zeros(6), np.zeros((6, 6))
         state[0::2], whole[0::2, 0::2] = angles_rad, covariance
         self._rest.state, self._rest.covariance = state, whole.copy()
-        whole[1::2, 1::2] = np.eye(3) * _RATE_SIGMA_RAD_S**2
+        whole[1::2, 1::2] = np.eye(3) * RATE_SIGMA_RAD_S**2
         self._motion.start(state, whole)
         self._evidence, self._moving = 0.0, False
         self._outliers.clear()
@@ -179,9 +181,11 @@ class TargetFilter:
         agreeing = self._outliers[-self._jump_count :]
         if len(agreeing) < self._jump_count or agreeing[-1] is not measurement:
             return False
-        if not all(_agree(before, measurement) for before in agreeing[:-1]):
+        if not all(jumps.agree(before, measurement) for before in agreeing[:-1]):
             return False
         self._open(agreeing[0], measurement)
+        if jumps.goes_on(agreeing[0], measurement, self._bound(measurement)):
+            self._moving, self._evidence = True, _EVIDENCE_TO_MOVE
         self._take(measurement, self._motion.fits(measurement, self._time_s))
         return True
 
@@ -218,7 +222,8 @@ class TargetFilter:
     def _weigh(self, advantage: float, rows: int) -> None:
         """Add to the evidence for motion; at its end the model at rest takes over where the target is."""
         # One row alone does not tell much: a depth that stays says nothing of a direction that moves.
-        evidence = _EVIDENCE_FADE ** (rows / 3.0) * self._evidence + max(min(advantage, 5.0), -3.0)
+        least, most = _OF_ONE_MEASUREMENT
+        evidence = _EVIDENCE_FADE ** (rows / 3.0) * self._evidence + min(max(advantage, least), most)
         self._evidence = min(max(evidence, _EVIDENCE_BOUNDS[0]), _EVIDENCE_BOUNDS[1])
         if self._moving:
             if self._evidence < _EVIDENCE_TO_REST:
@@ -267,28 +272,10 @@ class TargetFilter:
         state, covariance = self._motion.mixed()
         covariance[0::2, 0::2] += ways.T @ ways * _JUMP_SIGMA_RAD**2
         covariance[0::2, 1::2] = covariance[1::2, 0::2] = 0.0
-        state[1::2], variances = _speed(before, measurement) if len(ways) == 3 else (0.0, _RATE_SIGMA_RAD_S**2)
+        state[1::2], variances = jumps.speed(before, measurement) if len(ways) == 3 else (0.0, RATE_SIGMA_RAD_S**2)
         covariance[1::2, 1::2] = np.eye(3) * variances
         self._motion.start(state, covariance, (0.5, 0.5))
         self._rest.covariance = self._rest.covariance.copy()
         self._rest.covariance[0::2, 0::2] += ways.T @ ways * _JUMP_SIGMA_RAD**2
         self._evidence, self._moving = 0.0, False
         self._outliers.clear()
-
-
-def _agree(before: Measurement, after: Measurement) -> bool:
-    """Tell whether two measurements may be of one thing."""
-    allowed = 5.0 * np.hypot(before.sigmas, after.sigmas)
-    allowed = allowed + 2.0 * _RATE_SIGMA_RAD_S * max(after.stamp_s - before.stamp_s, 0.0)
-    return bool((np.abs(before.values - after.values) <= allowed).all())
-
-
-def _speed(before: Measurement, after: Measurement) -> tuple[Array, float]:
-    """Return the rates (3,) between two places of a target that was thought to be elsewhere, and their variance."""
-    prior = _RATE_SIGMA_RAD_S**2
-    duration_s = after.stamp_s - before.stamp_s
-    if not duration_s > 0.01:
-        return np.zeros(3), prior
-    rates = np.asarray(np.linalg.solve(after.coefficients, after.values - before.values) / duration_s, dtype=np.float64)
-    noise = 2.0 * float(np.max(after.sigmas)) ** 2 / duration_s**2
-    return rates * (prior / (prior + noise)), prior * noise / (prior + noise)
