@@ -7,6 +7,7 @@ comes from its own true shafts, by the definition of the axes; only the servo pl
 import heapq
 import itertools
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -91,7 +92,8 @@ class FakeHead:
         self._track_id, self._lock_s = 1, self.begin_s + 0.1
         self._pending_frame: tuple[float, Array, bool] | None = None
         self._left_pixel = np.full(2, math.nan)
-        self._fast_s = -math.inf
+        self._lately: deque[Array] = deque(maxlen=22)
+        self._turned = False
         self._slow_ticks = 0
 
     @property
@@ -159,14 +161,14 @@ class FakeHead:
         return self.project(self.target(self.time_s), left)
 
     def _note_saccades(self) -> None:
-        """As the class-free tracker does: a new lock once the eyes rest after more than 4 degrees in 100 ms."""
+        """As the class-free tracker does: a new lock once the eyes rest after a turn of 2.5 degrees in 70 ms."""
         speed = max(abs(plant.velocity_rad_s) for plant in self._plants.values())
         self._slow_ticks = self._slow_ticks + 1 if speed < 0.35 else 0
-        if speed > math.radians(40.0):
-            self._fast_s = self.time_s
-        if self._slow_ticks == 9 and self.time_s - self._fast_s < 0.1:
-            self._track_id, self._lock_s = self._track_id + 1, self.time_s
-            self._fast_s = -math.inf
+        self._lately.append(self.true_rad)
+        self._turned |= bool(np.abs(self._lately[-1] - self._lately[0]).max() > math.radians(2.5))
+        if self._turned and self._slow_ticks == 9:
+            self._track_id, self._lock_s, self._turned = self._track_id + 1, self.time_s, False
+            self._lately.clear()
 
     def _see_pair(self, left_s: float, left_xy: Array, visible: bool, right_s: float) -> None:
         seeing, focal = self.seeing, self.rig.left_camera.fx_px
