@@ -30,7 +30,12 @@ EVERYWHERE: tuple[Part, ...] = (
     figures.crossing_rows,
     figures.rest_rows,
 )
-BY_DEFAULT: tuple[Part, ...] = (figures.search_rows, figures.occlusion_by_track_rows, figures.crossing_by_track_rows)
+BY_DEFAULT: tuple[Part, ...] = (
+    figures.search_rows,
+    figures.by_class_rows,
+    figures.occlusion_by_track_rows,
+    figures.crossing_by_track_rows,
+)
 
 
 def jobs() -> list[tuple[Part, Setting]]:

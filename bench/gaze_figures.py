@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -117,6 +117,44 @@ def overshoot(trace: Trace, at_s: float) -> float:
     errors = trace.errors_deg[after, 0]
     step = errors[0]
     return max(0.0, float((-errors * math.copysign(1.0, step)).max())) / abs(step)
+
+
+def onset_s(trace: Trace, moves_from_s: float) -> float:
+    """Return how long after a target began to move the eyes were first back within a degree, and stayed for 0.2 s."""
+    late = trace.time_s >= moves_from_s
+    times, errors = trace.time_s[late], trace.error_deg[late]
+    left = np.flatnonzero(errors > KEPT_DEG)
+    if left.size == 0:
+        return 0.0
+    for i in range(int(left[0]), times.size):
+        for_a_while = (times >= times[i]) & (times < times[i] + 0.2)
+        if (errors[for_a_while] <= KEPT_DEG).all():
+            return float(times[i]) - moves_from_s
+    return math.inf
+
+
+def by_class_rows(setting: Setting) -> list[Row]:
+    """A detected class with the tracker beside the detector, as the graph has them, against the detector alone."""
+    values, alone = (_given_rows(setting, given) for given in ("class", "boxes"))
+    return [replace(v, against="boxes alone", against_value=a.value) for v, a in zip(values, alone, strict=True)]
+
+
+def _given_rows(setting: Setting, given: str) -> list[Row]:
+    still = StaticFigures(run_all(scenarios.static(40, given, seed=13), setting), setting)
+    kept, worst = crossing_rows(setting, given)[:2]
+    ramps = run_all(scenarios.ramps((20.0,) * 5, given), setting)
+    recovery = occlusion_rows(setting, given)[0]
+    errors = [float(np.median(trace.error_deg[trace.time_s > 1.6])) for trace in ramps]
+    return [
+        Row("gaze.verged.by_class", still.verged / still.count, "share"),
+        Row("gaze.falsely_verged.by_class", float(still.false), "trials"),
+        Row("gaze.declared_s.by_class", quantile(still.declared_s, 0.5), "s"),
+        Row("gaze.onset_s.by_class", quantile([onset_s(trace, 1.0) for trace in ramps], 0.5), "s"),
+        Row("gaze.pursuit_error_deg.by_class", float(np.mean(errors)), "deg"),
+        replace(recovery, what="gaze.recovery_s.by_class"),
+        replace(kept, what="gaze.crossing_kept.by_class"),
+        replace(worst, what="gaze.crossing_worst_deg.by_class"),
+    ]
 
 
 def step_rows(setting: Setting) -> list[Row]:

@@ -39,7 +39,11 @@ def tolerance_deg(servo: str) -> float:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A target (seconds to (3,) [m]), where the eyes begin, how long, and how the target is given."""
+    """A target (seconds to (3,) [m]), where the eyes begin, how long, and how the target is given.
+
+    `given` is "pairs", stereo pixel pairs at frame rate; "boxes", the detector's alone; "class", those and the tracker;
+    "click" or "two_clicks", one pixel or one pair of them and then the tracker.
+    """
 
     target: Callable[[float], Array]
     start_rad: Mapping[str, float]
@@ -108,6 +112,7 @@ class Realism:
     servo_spread: float = 0.2
     noise_px: float = 0.4
     stamp_error_s: float = 0.003
+    frame_rate_hz: float = 30.0
     box: Mapping[str, float] = field(default_factory=lambda: {"rate_hz": 15.0, "latency_s": 0.04, "noise_px": 1.2})
 
 
@@ -126,14 +131,15 @@ def real_servo(spec: ServoSpec, spread: float, random: np.random.Generator) -> S
 
 def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np.random.Generator) -> Seeing:
     """Return how the head sees in this run."""
-    boxes = scenario.given in ("boxes", "pairs")
+    boxes = scenario.given in ("boxes", "pairs", "class")
     frame_rate = scenario.given == "pairs"
     return Seeing(
         latency_s=setting.latency_ms * 1e-3,
+        frame_ticks=round(300.0 / realism.frame_rate_hz),
         skew_ticks=int(random.integers(0, 6)),
         noise_px=realism.noise_px,
         stamp_error_s=random.uniform(-realism.stamp_error_s, realism.stamp_error_s),
-        track=not boxes,
+        track=not boxes or scenario.given == "class",
         fovea=True,
         boxes=boxes,
         box_frame_ticks=10 if frame_rate else round(300.0 / realism.box["rate_hz"]),
@@ -266,9 +272,11 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
 
 
 def _begin(controller: GazeController, scenario: Scenario, head: FakeHead) -> None:
-    if scenario.given == "click":
-        x, y = head.project(scenario.target(head.time_s), left=True)
-        goal = Goal(GoalKind.PIXEL, left_xy=(float(x), float(y)), time_limit_s=600.0)
+    if scenario.given in ("click", "two_clicks"):
+        left, right = (head.project(scenario.target(head.time_s), eye).tolist() for eye in (True, False))
+        goal = Goal(GoalKind.PIXEL, left_xy=tuple(left), time_limit_s=600.0)
+        if scenario.given == "two_clicks":
+            goal = Goal(GoalKind.STEREO_PIXEL, left_xy=tuple(left), right_xy=tuple(right), time_limit_s=600.0)
     else:
         goal = Goal(GoalKind.CLASS, class_name="target", time_limit_s=600.0)
     controller.look_at(goal, head.time_s)

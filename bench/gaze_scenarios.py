@@ -79,7 +79,7 @@ def static(count: int, given: str, seed: int = 1) -> list[Scenario]:
     return scenarios
 
 
-def out_of_view(count: int, seed: int = 2) -> list[Scenario]:
+def out_of_view(count: int, given: str = "boxes", seed: int = 2) -> list[Scenario]:
     """Targets anywhere in reach that neither eye sees at the start."""
     scenarios: list[Scenario] = []
     i = 0
@@ -95,7 +95,7 @@ def out_of_view(count: int, seed: int = 2) -> list[Scenario]:
         pose = {"pan_left": version - 0.03, "pan_right": version + 0.03, "tilt": random.uniform(-0.4, 0.4)}
         aside = min(abs(left - pose["pan_left"]), abs(right - pose["pan_right"]))
         if aside > _HALF_FIELD_RAD[0] + 0.1 or abs(tilt - pose["tilt"]) > _HALF_FIELD_RAD[1] + 0.1:
-            scenarios.append(Scenario(still(point), pose, 10.0, "boxes", seed=1000 * seed + i))
+            scenarios.append(Scenario(still(point), pose, 10.0, given, seed=1000 * seed + i))
     return scenarios
 
 

@@ -35,11 +35,11 @@ def test_the_first_track_keeps_the_click() -> None:
 
 def test_an_offset_is_learnt_from_boxes_of_the_same_pair_alone() -> None:
     lock = adopted(PLACE)
-    lock.take(1.0, moved(0.8, 0.0))
+    lock.take(1.0, 1, moved(0.8, 0.0))
     lock.hold_against(1.1, PLACE)
     np.testing.assert_allclose(lock.offset, 0.0, atol=1e-12)
     for k in range(12):
-        lock.take(2.0 + 0.1 * k, moved(0.8, -0.2))
+        lock.take(2.0 + 0.1 * k, 1, moved(0.8, -0.2))
         lock.hold_against(2.0 + 0.1 * k, PLACE)
     np.testing.assert_allclose(lock.offset, np.array([-0.8, 0.2]) * DEG, atol=0.02 * DEG)
 
@@ -48,14 +48,14 @@ def test_a_new_track_takes_the_first_box_at_its_word() -> None:
     lock = adopted(PLACE)
     assert lock.adopt(2, moved(0.5, 0.0), ESTIMATE, 0.07, 0.02) == ""
     np.testing.assert_allclose(lock.offset, 0.0)
-    lock.take(1.0, moved(0.5, 0.0))
+    lock.take(1.0, 2, moved(0.5, 0.0))
     lock.hold_against(1.0, PLACE)
     np.testing.assert_allclose(lock.offset, np.array([-0.5, 0.0]) * DEG, atol=1e-12)
 
 
 def test_a_refused_track_teaches_nothing_any_more() -> None:
     lock = adopted(PLACE)
-    lock.take(1.0, PLACE)
+    lock.take(1.0, 1, PLACE)
     assert lock.place_at(1.0) is not None
     lock.refuse()
     assert lock.place_at(1.0) is None
@@ -64,9 +64,74 @@ def test_a_refused_track_teaches_nothing_any_more() -> None:
 
 def test_boxes_that_one_eye_alone_saw_teach_nothing() -> None:
     lock = adopted(PLACE)
-    lock.take(1.0, moved(0.5, 0.0))
+    lock.take(1.0, 1, moved(0.5, 0.0))
     lock.hold_against(1.0, np.array([math.nan, *PLACE[1:]]))
     np.testing.assert_allclose(lock.offset, 0.0, atol=1e-12)
+
+
+def followed(lock: TrackLock) -> int | None:
+    return lock.track_id
+
+
+def test_a_class_takes_the_track_that_its_boxes_are_around_in_one_pair() -> None:
+    lock = TrackLock()
+    lock.take(1.0, 7, moved(0.3, -0.2))
+    lock.adopt_by_class(1.1, ESTIMATE, PLACE, 0.1, 0.01)
+    assert followed(lock) is None, "another pair"
+    lock.adopt_by_class(1.0, ESTIMATE, PLACE, 0.1, 0.01)
+    assert followed(lock) == 7
+    place = lock.place_at(1.0)
+    assert place is not None
+    np.testing.assert_allclose(place, PLACE[[0, 2]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "seen_rad",
+    [moved(4.0, 0.0), moved(0.0, 4.0), PLACE + np.array([0.0, 1.0, 0.0]) * DEG],
+    ids=["beside", "below", "deeper"],
+)
+def test_a_class_leaves_a_track_of_another_thing_and_lets_go_of_one_that_strays(seen_rad: np.ndarray) -> None:
+    lock = TrackLock()
+    lock.take(1.0, 7, seen_rad)
+    lock.adopt_by_class(1.0, ESTIMATE, PLACE, 0.1, 0.01)
+    assert followed(lock) is None
+    lock.take(2.0, 7, PLACE)
+    lock.adopt_by_class(2.0, ESTIMATE, PLACE, 0.1, 0.01)
+    assert followed(lock) == 7
+    for stamp_s, seen, kept in (
+        (3.0, seen_rad, True),
+        (4.0, PLACE, True),
+        (5.0, seen_rad, True),
+        (6.0, seen_rad, False),
+    ):
+        lock.take(stamp_s, 7, seen)
+        assert lock.is_of_class(stamp_s, PLACE, 0.1, 0.01) is kept
+    lock.refuse()
+    lock.take(7.0, 7, PLACE)
+    lock.adopt_by_class(7.0, ESTIMATE, PLACE, 0.1, 0.01)
+    assert followed(lock) is None
+
+
+@pytest.mark.parametrize(("left_rad", "extent_rad"), [(math.nan, 0.1), (PLACE[0], math.nan)])
+def test_boxes_that_do_not_tell_where_or_how_wide_neither_give_nor_take_a_track(
+    left_rad: float, extent_rad: float
+) -> None:
+    lock, vague = TrackLock(), np.array([left_rad, *PLACE[1:]])
+    lock.take(1.0, 7, moved(9.0, 0.0))
+    lock.adopt_by_class(1.0, ESTIMATE, vague, extent_rad, 0.01)
+    assert followed(lock) is None
+    lock.take(2.0, 7, PLACE)
+    lock.adopt_by_class(2.0, ESTIMATE, PLACE, 0.1, 0.01)
+    for stamp_s in (3.0, 4.0, 5.0):
+        lock.take(stamp_s, 7, moved(9.0, 0.0))
+        assert lock.is_of_class(stamp_s, vague, extent_rad, 0.01)
+
+
+def test_a_track_seen_by_one_eye_is_taken_by_its_direction() -> None:
+    lock = TrackLock()
+    lock.take(1.0, 7, np.array([PLACE[0], math.nan, PLACE[2]]))
+    lock.adopt_by_class(1.0, ESTIMATE, PLACE, 0.1, 0.01)
+    assert followed(lock) == 7
 
 
 def test_boxes_learn_from_the_track_at_first_and_then_stand() -> None:

@@ -207,3 +207,45 @@ def test_what_only_the_fovea_still_sees_is_not_called_verged_for_long(seen: bool
     assert trial.verged[(trial.time_s > 1.5) & (trial.time_s < 2.5)].all()
     assert trial.verged[trial.time_s > 3.5].any() == seen
     assert seen or "the target was not seen for long" in trial.reason
+
+
+SLOW_DETECTOR = replace(DETECTOR, box_frame_ticks=37, box_latency_s=0.14)
+
+
+def at_twenty_degrees_a_second(time_s: float) -> np.ndarray:
+    return place(0.8, -20.0 + 20.0 * min(max(time_s - 2.0, 0.0), 2.0))
+
+
+@pytest.mark.parametrize("servo", [IDEAL, SG90])
+def test_the_tracker_follows_a_class_between_its_boxes(servo: ServoSpec) -> None:
+    alone, both = (
+        Trial(at_twenty_degrees_a_second, replace(SLOW_DETECTOR, track=track), servo) for track in (False, True)
+    )
+    assert both.settled_s(2.0, 1.5) < 0.45
+    assert both.settled_s(2.0, 1.5) < 0.6 * alone.settled_s(2.0, 1.5)
+    assert both.verged[both.time_s > 3.0].mean() > 0.8
+
+
+def test_a_track_of_which_no_box_tells_any_more_is_not_followed_for_long() -> None:
+    def no_boxes_later(observation: Observation, time_s: float) -> Observation | None:
+        return None if isinstance(observation, BoxSighting) and time_s > 2.0 else observation
+
+    seeing = replace(SLOW_DETECTOR, track=True, fovea=False)
+    trial = Trial(lambda time_s: place(0.8, 0.0), seeing, arriving=no_boxes_later, until_s=5.0)
+    known = [phase for phase, time_s in zip(trial.phases, trial.time_s, strict=True) if 1.5 < time_s < 2.5]
+    assert set(known) == {Phase.FIXATE}
+    assert Phase.LOST in [phase for phase, time_s in zip(trial.phases, trial.time_s, strict=True) if time_s < 4.0]
+    assert not trial.verged[trial.time_s > 4.0].any()
+
+
+@pytest.mark.parametrize("below_deg", [0.8, 2.5])
+def test_a_track_that_locked_beside_what_is_wanted_does_not_pull_the_eyes_there(below_deg: float) -> None:
+    def beside(observation: Observation, time_s: float) -> Observation:
+        if not isinstance(observation, TrackSighting):
+            return observation
+        return replace(observation, left_y=observation.left_y + math.radians(below_deg))
+
+    seeing = replace(SLOW_DETECTOR, track=True)
+    trial = Trial(lambda time_s: place(0.8, 5.0), seeing, SG90, arriving=beside, start_rad={"pan_right": 0.06})
+    assert trial.error_deg[trial.time_s > 1.0].max() < 0.75
+    assert trial.verged[trial.time_s > 1.0].all()

@@ -19,6 +19,8 @@ _BOXES_TO_LEARN = 5
 _LATER_SHARE = 0.01
 _LONGEST_MEAN_OF_TRACK = 4
 _SAME_PAIR_S = 0.012
+_BESIDE_BOXES = 2
+_NOWHERE: Array = np.full(3, math.nan)
 
 
 class TrackLock:
@@ -28,13 +30,12 @@ class TrackLock:
         self.track_id: int | None = None
         self.offset = np.zeros(2)
         self._refused_id: int | None = None
-        self._compared = 0
-        self._seen: deque[tuple[float, Array]] = deque(maxlen=30)
+        self._compared = self._beside = 0
+        self._seen: deque[tuple[float, int, Array]] = deque(maxlen=30)
 
     def refuse(self) -> None:
         """The track is something else's: do not take it again."""
         self._refused_id, self.track_id = self.track_id, None
-        self._seen.clear()
 
     def adopt(
         self,
@@ -60,17 +61,20 @@ class TrackLock:
         first = self.track_id is None
         self.offset, self._compared = (offset, 1) if first else (np.zeros(2), 0)
         self.track_id = track_id
-        self._seen.clear()
         return ""
 
-    def take(self, stamp_s: float, seen_rad: Array) -> None:
-        """Keep where the track was, at `seen_rad` (left pan, right pan, tilt), for who is slower to say."""
-        self._seen.append((stamp_s, seen_rad[[0, 2]]))
+    def take(self, stamp_s: float, track_id: int, seen_rad: Array) -> None:
+        """Keep where a track was, at `seen_rad` (left pan, right pan, tilt), for who is slower to say."""
+        self._seen.append((stamp_s, track_id, seen_rad))
 
     def place_at(self, stamp_s: float) -> Array | None:
-        """Return pan and tilt (2,) of the target as the track has it in a pair, None if it was not seen there."""
-        same = [seen for seen_s, seen in self._seen if abs(seen_s - stamp_s) < _SAME_PAIR_S]
-        return same[-1] + self.offset if same else None
+        """Return pan and tilt (2,) of the target as its track has it in a pair, None if it was not seen there."""
+        track_id, seen_rad = self._in_pair(stamp_s)
+        return seen_rad[[0, 2]] + self.offset if track_id is not None and track_id == self.track_id else None
+
+    def _in_pair(self, stamp_s: float) -> tuple[int | None, Array]:
+        same = [(track_id, seen) for seen_s, track_id, seen in self._seen if abs(seen_s - stamp_s) < _SAME_PAIR_S]
+        return same[-1] if same else (None, _NOWHERE)
 
     def hold_against(self, stamp_s: float, target_rad: Array) -> None:
         """Learn the offset from where boxes have the target (left pan, right pan, tilt) in a pair.
@@ -82,6 +86,49 @@ class TrackLock:
             return
         self._compared = min(self._compared + 1, _LONGEST_MEAN_OF_TRACK)
         self.offset = self.offset + (target_rad[[0, 2]] - place) / self._compared
+
+    def adopt_by_class(
+        self, stamp_s: float, estimate: TargetEstimate, target_rad: Array, extent_rad: float, depth_margin_rad: float
+    ) -> None:
+        """Take the track that boxes of the wanted class show to follow the same thing in one pair.
+
+        Args:
+            stamp_s: of the pair.
+            estimate: of the target then, with these boxes and all before them.
+            target_rad: (left pan, right pan, tilt) (3,) of the boxes' middles; NaN where one eye has none.
+            extent_rad: how wide the boxes are.
+            depth_margin_rad: by how much vergence may differ over the thing.
+        """
+        track_id, seen_rad = self._in_pair(stamp_s)
+        if track_id in (None, self.track_id, self._refused_id):
+            return
+        if self._is_within(seen_rad[[0, 2]], seen_rad, target_rad, extent_rad, depth_margin_rad):
+            self.track_id, self.offset, self._compared = track_id, (estimate.joints_rad - seen_rad)[[0, 2]], 2
+            self._beside = 0
+
+    def is_of_class(self, stamp_s: float, target_rad: Array, extent_rad: float, depth_margin_rad: float) -> bool:
+        """Hold the track against boxes of the wanted class; False once two in a row say that it follows another thing.
+
+        Arguments as in `adopt_by_class`.
+        """
+        place, (_, seen_rad) = self.place_at(stamp_s), self._in_pair(stamp_s)
+        if place is None or not np.isfinite([*target_rad[[0, 2]], extent_rad]).all():
+            return True
+        if self._is_within(place, seen_rad, target_rad, extent_rad, depth_margin_rad):
+            self._beside = 0
+            self.hold_against(stamp_s, target_rad)
+        else:
+            self._beside += 1
+        return self._beside < _BESIDE_BOXES
+
+    @staticmethod
+    def _is_within(
+        place_rad: Array, seen_rad: Array, target_rad: Array, extent_rad: float, depth_margin_rad: float
+    ) -> bool:
+        """Tell whether what is at pan and tilt (2,) and seen at (3,) may be what the boxes are around."""
+        beside = float(np.abs(place_rad - target_rad[[0, 2]]).max())
+        deeper = abs(float((seen_rad[1] - seen_rad[0]) - (target_rad[1] - target_rad[0])))
+        return beside <= 0.5 * extent_rad + _BOX_MARGIN_RAD and not deeper > depth_margin_rad
 
 
 class BoxLock:

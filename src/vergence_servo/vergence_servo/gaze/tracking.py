@@ -31,6 +31,7 @@ Array = npt.NDArray[np.float64]
 
 _FRESH_S = 0.15
 _BOX_LATE_S = 0.4
+_VOUCHED_S = 1.0
 
 
 class TargetTracking(BelievedTarget):
@@ -54,7 +55,7 @@ class TargetTracking(BelievedTarget):
         self._agreement.clear()
         self._depths.clear()
         self._rivals.clear()
-        self._wanted_since_s = -math.inf
+        self._wanted_since_s = self._class_seen_s = -math.inf
         self._fovea_was_astray = False
 
     def want(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
@@ -94,6 +95,7 @@ class TargetTracking(BelievedTarget):
         disparity_sigma = positive_sigma(sighting.sigma_rad, self._p.direction_sigma_rad)
         measurement, seen = directions.track(self._history, sighting, sigma, disparity_sigma)
         self.heed_moves(sighting.stamp_s)
+        self._track.take(sighting.stamp_s, sighting.track_id, seen)
         if not self._is_wanted_track(sighting, seen):
             return False
         if math.isfinite(seen[1]):
@@ -105,7 +107,6 @@ class TargetTracking(BelievedTarget):
                 # Something else covers part of it: where it is can still be told.
                 there = replace(sighting, disparity_rad=math.nan)
                 measurement, seen = directions.track(self._history, there, sigma, disparity_sigma)
-        self._track.take(sighting.stamp_s, seen)
         measurement, seen = _beside(measurement, seen, self._track.offset)
         return self.believe(measurement, seen, sighting.skew_s, now_s, "track")
 
@@ -175,6 +176,8 @@ class TargetTracking(BelievedTarget):
             self._track.hold_against(sighting.stamp_s, seen)
         elif not self.filter.initialised:
             self.start_from(measurement)
+        elif not self._track.is_of_class(sighting.stamp_s, seen, sighting.extent_rad, own_depth + SAME_DEPTH_RAD):
+            self._refuse_track()
 
         def may_jump() -> bool:
             if not by_class:
@@ -186,6 +189,10 @@ class TargetTracking(BelievedTarget):
         believed = self.believe(measurement, seen, sighting.skew_s, now_s, "box", may_jump)
         if believed:
             self._rivals.found(sighting.stamp_s, self.filter.at(sighting.stamp_s))
+            if by_class:
+                self._class_seen_s = max(sighting.stamp_s, self._class_seen_s)
+                there, margin_rad = self.filter.at(sighting.stamp_s), own_depth + SAME_DEPTH_RAD
+                self._track.adopt_by_class(sighting.stamp_s, there, seen, sighting.extent_rad, margin_rad)
         if believed or not by_class:
             self._agreement.see_box(sighting.stamp_s, vergence, math.sqrt(2.0) * sigma, own_depth)
             self._heed_boxes(sighting.stamp_s, unexpected_rad)
@@ -208,11 +215,14 @@ class TargetTracking(BelievedTarget):
         off_rad = self._agreement.fovea_off_rad if astray and not self._fovea_was_astray else 0.0
         if self._track.track_id is not None and self._agreement.track_is_astray(stamp_s) and not astray:
             off_rad = self._agreement.track_off_rad
-            self._track.refuse()
-            self._agreement.drop_track()
+            self._refuse_track()
         if off_rad and math.isfinite(unexpected_rad):
             self.filter.loosen(np.array([0.5, 0.5, 0.0]) * min(abs(off_rad), unexpected_rad) ** 2)
         self._fovea_was_astray = astray
+
+    def _refuse_track(self) -> None:
+        self._track.refuse()
+        self._agreement.drop_track()
 
     def see_point(self, sighting: PointSighting, now_s: float) -> bool:
         """Take a point of the stream; True if the stream is wanted and the point was believed."""
@@ -232,9 +242,15 @@ class TargetTracking(BelievedTarget):
         return self._exposures.were_still(stamp_s, skew_s, target)
 
     def _is_wanted_track(self, sighting: TrackSighting, seen_rad: Array) -> bool:
-        if self.class_name is not None or self.takes_stream:
+        if self.takes_stream:
             return False
-        if sighting.track_id == self._track.track_id:
+        same = sighting.track_id == self._track.track_id
+        if self.class_name is not None:
+            # The tracker knows no classes: it is believed for as long as boxes say that it follows what is wanted.
+            if not same:
+                self._agreement.drop_track()
+            return same and abs(sighting.stamp_s - self._class_seen_s) < _VOUCHED_S
+        if same:
             return True
         estimate = self.estimate(sighting.stamp_s)
         if estimate is None or sighting.stamp_s < self._wanted_since_s:
