@@ -22,8 +22,8 @@ from vergence_rig.rig import Rig, load_rig
 
 # The simulator, its ground truth and the demo's recorder share two cores with the nodes: what they cannot keep up with
 # comes late, and late images are worth less than fewer.
-_FRAME_RATE_HZ = 20.0
-_BOX_RATE_HZ = 8.0
+FRAME_RATE_HZ = 20.0
+BOX_RATE_HZ = 8.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,17 +100,21 @@ def _runner(options: argparse.Namespace, rig: Rig, alive: Callable[[], None]) ->
         recorder.close()
 
 
-def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
-    rig = str(_ideal_rig(options.out) if options.ideal else config_dir() / "rig.yaml")
-    sim: dict[str, object] = {"rig": rig, "seed": options.seed, "frame_rate_hz": _FRAME_RATE_HZ}
-    if options.ideal:
-        sim["preset"] = "ideal"
+def head_nodes(rig: Path, **sim: object) -> dict[str, NodeCommand]:
+    """Return the nodes of a simulated head by name, with their shipped YAML; `sim` are parameters of sim_node."""
+    at = {"rig": str(rig)}
     return {
-        "sim_node": NodeCommand("vergence_sim", "sim_node", sim),
-        "edge_metric_node": NodeCommand("vergence_metric", "edge_metric_node", {"rig": rig}),
-        "box_metric_node": NodeCommand("vergence_metric", "box_metric_node", {"rig": rig, "rate_hz": _BOX_RATE_HZ}),
-        "gaze_controller_node": NodeCommand("vergence_servo", "gaze_controller_node", {"rig": rig}),
+        "sim_node": NodeCommand("vergence_sim", "sim_node", at | {"frame_rate_hz": FRAME_RATE_HZ} | sim),
+        "edge_metric_node": NodeCommand("vergence_metric", "edge_metric_node", at),
+        "box_metric_node": NodeCommand("vergence_metric", "box_metric_node", at | {"rate_hz": BOX_RATE_HZ}),
+        "gaze_controller_node": NodeCommand("vergence_servo", "gaze_controller_node", at),
     }
+
+
+def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
+    if options.ideal:
+        return head_nodes(_ideal_rig(options.out), seed=options.seed, preset="ideal")
+    return head_nodes(config_dir() / "rig.yaml", seed=options.seed)
 
 
 def _ideal_rig(out_dir: Path) -> Path:

@@ -70,6 +70,7 @@ class Recorder:
         self.node.create_subscription(TrueVergence, "ground_truth/vergence", self._into(self.truths), STATE_QOS)
         self.node.create_subscription(PointStamped, "gaze/fixation_point", self._into(self.fixations), STATE_QOS)
         self._image_subscriptions: list[Any] = []
+        self._further: list[Any] = []
         self._look_at = ActionClient(self.node, LookAt, "gaze/look_at")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
@@ -82,6 +83,17 @@ class Recorder:
         self._thread.join(timeout=2.0)
         self.node.destroy_node()
         rclpy.try_shutdown()
+
+    def listen(self, message_type: type, topic: str, alive: Callable[[], None]) -> list[Stamped]:
+        """Record one more topic from now on; returns the list that its messages are appended to."""
+        series: list[Stamped] = []
+        self._in_executor(
+            lambda: self._further.append(
+                self.node.create_subscription(message_type, topic, self._into(series), STATE_QOS)
+            ),
+            alive,
+        )
+        return series
 
     def now_s(self) -> float:
         """Return the node's time in seconds."""
