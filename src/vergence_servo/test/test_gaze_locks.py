@@ -105,7 +105,7 @@ def test_a_class_leaves_a_track_of_another_thing_and_lets_go_of_one_that_strays(
         (6.0, seen_rad, False),
     ):
         lock.take(stamp_s, 7, seen)
-        assert lock.is_of_class(stamp_s, PLACE, 0.1, 0.01) is kept
+        assert lock.hold_against_class(stamp_s, PLACE, 0.1, 0.01) is kept
     lock.refuse()
     lock.take(7.0, 7, PLACE)
     lock.adopt_by_class(7.0, ESTIMATE, PLACE, 0.1, 0.01)
@@ -124,7 +124,7 @@ def test_boxes_that_do_not_tell_where_or_how_wide_neither_give_nor_take_a_track(
     lock.adopt_by_class(2.0, ESTIMATE, PLACE, 0.1, 0.01)
     for stamp_s in (3.0, 4.0, 5.0):
         lock.take(stamp_s, 7, moved(9.0, 0.0))
-        assert lock.is_of_class(stamp_s, vague, extent_rad, 0.01)
+        assert lock.hold_against_class(stamp_s, vague, extent_rad, 0.01)
 
 
 def test_a_track_seen_by_one_eye_is_taken_by_its_direction() -> None:

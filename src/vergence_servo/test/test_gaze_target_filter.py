@@ -60,8 +60,8 @@ def test_a_steady_speed_is_predicted() -> None:
 
 def test_a_swing_of_one_hertz_is_followed_and_not_without_a_model_for_it() -> None:
     with_it, without = followed(swing, 4.0), followed(swing, 4.0, manoeuvre_rad_s2=1.0)
-    assert np.median(np.abs(with_it)) < math.radians(1.8)
-    assert np.abs(with_it).max() < math.radians(5.0)
+    assert np.median(np.abs(with_it)) < math.radians(1.2)
+    assert np.abs(with_it).max() < math.radians(3.5)
     assert np.median(np.abs(with_it)) < 0.7 * np.median(np.abs(without))
 
 

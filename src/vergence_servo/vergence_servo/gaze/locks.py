@@ -102,33 +102,24 @@ class TrackLock:
         track_id, seen_rad = self._in_pair(stamp_s)
         if track_id in (None, self.track_id, self._refused_id):
             return
-        if self._is_within(seen_rad[[0, 2]], seen_rad, target_rad, extent_rad, depth_margin_rad):
+        if _is_within(seen_rad[[0, 2]], seen_rad, target_rad, extent_rad, depth_margin_rad):
             self.track_id, self.offset, self._compared = track_id, (estimate.joints_rad - seen_rad)[[0, 2]], 2
             self._beside = 0
 
-    def is_of_class(self, stamp_s: float, target_rad: Array, extent_rad: float, depth_margin_rad: float) -> bool:
-        """Hold the track against boxes of the wanted class; False once two in a row say that it follows another thing.
+    def hold_against_class(self, stamp_s: float, target_rad: Array, extent_rad: float, depth_margin_rad: float) -> bool:
+        """Learn the offset from boxes of the wanted class; False once two in a row say that the track is another's.
 
         Arguments as in `adopt_by_class`.
         """
         place, (_, seen_rad) = self.place_at(stamp_s), self._in_pair(stamp_s)
         if place is None or not np.isfinite([*target_rad[[0, 2]], extent_rad]).all():
             return True
-        if self._is_within(place, seen_rad, target_rad, extent_rad, depth_margin_rad):
+        if _is_within(place, seen_rad, target_rad, extent_rad, depth_margin_rad):
             self._beside = 0
             self.hold_against(stamp_s, target_rad)
         else:
             self._beside += 1
         return self._beside < _BESIDE_BOXES
-
-    @staticmethod
-    def _is_within(
-        place_rad: Array, seen_rad: Array, target_rad: Array, extent_rad: float, depth_margin_rad: float
-    ) -> bool:
-        """Tell whether what is at pan and tilt (2,) and seen at (3,) may be what the boxes are around."""
-        beside = float(np.abs(place_rad - target_rad[[0, 2]]).max())
-        deeper = abs(float((seen_rad[1] - seen_rad[0]) - (target_rad[1] - target_rad[0])))
-        return beside <= 0.5 * extent_rad + _BOX_MARGIN_RAD and not deeper > depth_margin_rad
 
 
 class BoxLock:
@@ -177,3 +168,12 @@ class BoxLock:
         self._learnt += 1
         share = 1.0 / self._learnt if self._learnt <= _BOXES_TO_LEARN else _LATER_SHARE
         self.offset = self.offset + share * (beside - self.offset)
+
+
+def _is_within(
+    place_rad: Array, seen_rad: Array, target_rad: Array, extent_rad: float, depth_margin_rad: float
+) -> bool:
+    """Tell whether what is at pan and tilt (2,) and seen at (3,) may be what the boxes are around."""
+    beside = float(np.abs(place_rad - target_rad[[0, 2]]).max())
+    deeper = abs(float((seen_rad[1] - seen_rad[0]) - (target_rad[1] - target_rad[0])))
+    return beside <= 0.5 * extent_rad + _BOX_MARGIN_RAD and not deeper > depth_margin_rad

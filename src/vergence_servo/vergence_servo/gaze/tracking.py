@@ -168,6 +168,7 @@ class TargetTracking(BelievedTarget):
         self.heed_moves(sighting.stamp_s)
         vergence = float(seen[1] - seen[0])
         own_depth = _own_depth(vergence, sighting.extent_rad)
+        as_deep_rad = own_depth + SAME_DEPTH_RAD
         if not by_class:
             if not self._contains_target(sighting, seen, own_depth):
                 return False
@@ -176,7 +177,7 @@ class TargetTracking(BelievedTarget):
             self._track.hold_against(sighting.stamp_s, seen)
         elif not self.filter.initialised:
             self.start_from(measurement)
-        elif not self._track.is_of_class(sighting.stamp_s, seen, sighting.extent_rad, own_depth + SAME_DEPTH_RAD):
+        elif not self._track.hold_against_class(sighting.stamp_s, seen, sighting.extent_rad, as_deep_rad):
             self._refuse_track()
 
         def may_jump() -> bool:
@@ -188,11 +189,11 @@ class TargetTracking(BelievedTarget):
         unexpected_rad = abs(vergence - self.filter.at(sighting.stamp_s).vergence_rad)
         believed = self.believe(measurement, seen, sighting.skew_s, now_s, "box", may_jump)
         if believed:
-            self._rivals.found(sighting.stamp_s, self.filter.at(sighting.stamp_s))
+            there = self.filter.at(sighting.stamp_s)
+            self._rivals.found(sighting.stamp_s, there)
             if by_class:
                 self._class_seen_s = max(sighting.stamp_s, self._class_seen_s)
-                there, margin_rad = self.filter.at(sighting.stamp_s), own_depth + SAME_DEPTH_RAD
-                self._track.adopt_by_class(sighting.stamp_s, there, seen, sighting.extent_rad, margin_rad)
+                self._track.adopt_by_class(sighting.stamp_s, there, seen, sighting.extent_rad, as_deep_rad)
         if believed or not by_class:
             self._agreement.see_box(sighting.stamp_s, vergence, math.sqrt(2.0) * sigma, own_depth)
             self._heed_boxes(sighting.stamp_s, unexpected_rad)
