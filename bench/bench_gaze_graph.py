@@ -13,21 +13,18 @@ import numpy.typing as npt
 
 from bench import gaze_runs
 from bench import gaze_scenarios as scenarios
-from bench.gaze_figures import StaticFigures, onset_s, quantile
+from bench.gaze_figures import STEADY_FROM_S, StaticFigures, onset_s, quantile, steady_error_deg
 from bench.gaze_runs import Realism, Scenario, Setting, Trace
 from bench.harness import Row
 from bench.process_head import SERVO, TARGET, ProcessHead, open_head
 from vergence_bringup.demo import BOX_RATE_HZ, FRAME_RATE_HZ
-from vergence_rig.rig import default_rig
-from vergence_sim.parameters import SimParameters
-from vergence_sim.simulator import Simulator
 
 PEER = "lockstep"
 BY_CLASS, BY_CLICKS, SEARCHES, OCCLUSIONS, RAMPS = 12, 12, 6, 4, 6
 HIDDEN_S = (2.5, 3.5)
 # 20 degrees/s across the line of sight at 0.8 m, from 20 degrees on one side to 20 on the other.
 RAMP_M_S = 0.8 * math.radians(20.0)
-RAMP_S, MOVES_FROM_S, STEADY_FROM_S = 2.0, 1.0, 1.6
+RAMP_S, MOVES_FROM_S = 2.0, 1.0
 BOX_LATENCY_S = 0.04
 Array = npt.NDArray[np.float64]
 
@@ -71,9 +68,6 @@ def figures(traces: list[list[Trace]], setting: Setting) -> list[Row]:
     """Return the rows of a set of runs, processes or lockstep."""
     by_class, by_clicks, searches, occlusions, ramps = traces
     still, of_class = StaticFigures(by_class + by_clicks, setting), StaticFigures(by_class, setting)
-    moving = [trace.time_s > STEADY_FROM_S for trace in ramps]
-    lags = [_lag_ms(trace, steady) for trace, steady in zip(ramps, moving, strict=True)]
-    errors = [float(np.median(trace.error_deg[steady])) for trace, steady in zip(ramps, moving, strict=True)]
     recoveries = [trace.declared_from(HIDDEN_S[1]) - HIDDEN_S[1] for trace in occlusions]
     return [
         Row("gaze.verged.processes", still.verged / still.count, "share"),
@@ -86,13 +80,16 @@ def figures(traces: list[list[Trace]], setting: Setting) -> list[Row]:
         Row("gaze.search_s.processes", quantile([trace.declared_from(0.0) for trace in searches], 0.5), "s"),
         Row("gaze.recovery_s.processes", quantile(recoveries, 0.5), "s"),
         Row("gaze.onset_s.processes", quantile([onset_s(trace, MOVES_FROM_S) for trace in ramps], 0.5), "s"),
-        Row("gaze.pursuit_lag_ms.sg90.processes", float(np.mean(lags)), "ms"),
-        Row("gaze.pursuit_error_deg.sg90.processes", float(np.mean(errors)), "deg"),
+        Row("gaze.pursuit_lag_ms.sg90.processes", float(np.mean([_lag_ms(trace) for trace in ramps])), "ms"),
+        Row(
+            "gaze.pursuit_error_deg.sg90.processes", float(np.mean([steady_error_deg(trace) for trace in ramps])), "deg"
+        ),
     ]
 
 
-def _lag_ms(trace: Trace, steady: npt.NDArray[np.bool_]) -> float:
+def _lag_ms(trace: Trace) -> float:
     """Return how far behind the target the version was, over the target's angular speed."""
+    steady = trace.time_s > STEADY_FROM_S
     wanted = trace.errors_deg[steady, 0] + trace.joints_deg[steady, :2].mean(axis=1)
     speed = np.polyfit(trace.time_s[steady], wanted, 1)[0]
     return float(trace.errors_deg[steady, 0].mean() / speed) * 1e3
@@ -125,7 +122,7 @@ def longer(occlusion: Scenario) -> Scenario:
 
 def in_the_open(chosen: list[Scenario]) -> list[Scenario]:
     """Return the scenarios whose target neither the room's furniture nor its walls hide from either eye."""
-    simulator = Simulator(SimParameters(), default_rig(), render=False)
+    simulator = gaze_runs.world()
     seen = []
     for scenario in chosen:
         point = scenario.target(0.0)

@@ -14,6 +14,8 @@ from bench.harness import Row
 
 DEFAULT = Setting()
 KEPT_DEG = 1.0
+STEADY_FROM_S = 1.6
+GIVEN_SUFFIX = {"boxes": "", "click": ".by_track", "class": ".by_class"}
 _STEP_S = 1.5
 
 
@@ -119,6 +121,11 @@ def overshoot(trace: Trace, at_s: float) -> float:
     return max(0.0, float((-errors * math.copysign(1.0, step)).max())) / abs(step)
 
 
+def steady_error_deg(trace: Trace) -> float:
+    """Return the median error once the eyes have caught up with a target that set out at 1 s or before."""
+    return float(np.median(trace.error_deg[trace.time_s > STEADY_FROM_S]))
+
+
 def onset_s(trace: Trace, moves_from_s: float) -> float:
     """Return how long after a target began to move the eyes were first back within a degree, and stayed for 0.2 s."""
     late = trace.time_s >= moves_from_s
@@ -141,19 +148,15 @@ def by_class_rows(setting: Setting) -> list[Row]:
 
 def _given_rows(setting: Setting, given: str) -> list[Row]:
     still = StaticFigures(run_all(scenarios.static(40, given, seed=13), setting), setting)
-    kept, worst = crossing_rows(setting, given)[:2]
-    ramps = run_all(scenarios.ramps((20.0,) * 5, given), setting)
-    recovery = occlusion_rows(setting, given)[0]
-    errors = [float(np.median(trace.error_deg[trace.time_s > 1.6])) for trace in ramps]
+    ramps, suffix = run_all(scenarios.ramps((20.0,) * 5, given), setting), GIVEN_SUFFIX[given]
     return [
-        Row("gaze.verged.by_class", still.verged / still.count, "share"),
-        Row("gaze.falsely_verged.by_class", float(still.false), "trials"),
-        Row("gaze.declared_s.by_class", quantile(still.declared_s, 0.5), "s"),
-        Row("gaze.onset_s.by_class", quantile([onset_s(trace, 1.0) for trace in ramps], 0.5), "s"),
-        Row("gaze.pursuit_error_deg.by_class", float(np.mean(errors)), "deg"),
-        replace(recovery, what="gaze.recovery_s.by_class"),
-        replace(kept, what="gaze.crossing_kept.by_class"),
-        replace(worst, what="gaze.crossing_worst_deg.by_class"),
+        Row(f"gaze.verged{suffix}", still.verged / still.count, "share"),
+        Row(f"gaze.falsely_verged{suffix}", float(still.false), "trials"),
+        Row(f"gaze.declared_s{suffix}", quantile(still.declared_s, 0.5), "s"),
+        Row(f"gaze.onset_s{suffix}", quantile([onset_s(trace, 1.0) for trace in ramps], 0.5), "s"),
+        Row(f"gaze.pursuit_error_deg{suffix}", float(np.mean([steady_error_deg(trace) for trace in ramps])), "deg"),
+        *occlusion_rows(setting, given),
+        *crossing_rows(setting, given),
     ]
 
 
@@ -176,7 +179,7 @@ def pursuit_rows(setting: Setting) -> list[Row]:
     lags, errors = [], []
     for scenario in scenarios.ramps((20.0,)):
         trace = gaze_runs.run(scenario, setting)
-        steady = (trace.time_s > 1.6) & (trace.time_s < scenario.duration_s)
+        steady = (trace.time_s > STEADY_FROM_S) & (trace.time_s < scenario.duration_s)
         speed = 20.0 * math.copysign(1.0, float(scenario.target(2.0)[1] - scenario.target(1.0)[1]))
         lags.append(float(np.mean(trace.errors_deg[steady, 0])) / speed * 1e3)
         errors.append(float(np.median(trace.error_deg[steady])))
@@ -191,7 +194,7 @@ def pursuit_rows(setting: Setting) -> list[Row]:
         ("sinusoid_1_hz", scenarios.sinusoids((1.0,))),
         ("rig_turning", scenarios.rig_turns(counts(setting).rig_turns)),
     ):
-        values = [np.median(trace.error_deg[trace.time_s > 1.6]) for trace in run_all(chosen, setting)]
+        values = [steady_error_deg(trace) for trace in run_all(chosen, setting)]
         rows.append(Row(f"gaze.{name}_error_deg{suffix}", float(np.mean(values)), "deg"))
     return rows
 
@@ -200,7 +203,7 @@ def occlusion_rows(setting: Setting, given: str = "boxes") -> list[Row]:
     """One second behind something nearer."""
     traces = run_all(scenarios.occlusions(counts(setting).occlusions, given), setting)
     times = [trace.declared_from(3.0) - 3.0 for trace in traces]
-    suffix = setting.suffix if given == "boxes" else f".by_track{setting.suffix}"
+    suffix = f"{GIVEN_SUFFIX[given]}{setting.suffix}"
     return [
         Row(f"gaze.recovery_s{suffix}", quantile(times, 0.5), "s"),
         Row(f"gaze.recovery_worst_s{suffix}", max(times), "s"),
@@ -221,7 +224,7 @@ def crossing_rows(setting: Setting, given: str = "boxes") -> list[Row]:
     after = [trace.error_deg[trace.time_s > scenarios.CROSSED_S + 2.0] for trace in traces]
     during = [trace.error_deg[np.abs(trace.time_s - scenarios.CROSSED_S) < 0.6] for trace in traces]
     kept = float(np.mean([bool(np.median(errors) < KEPT_DEG) for errors in after]))
-    suffix = setting.suffix if given == "boxes" else f".by_track{setting.suffix}"
+    suffix = f"{GIVEN_SUFFIX[given]}{setting.suffix}"
     return [
         Row(f"gaze.crossing_kept{suffix}", kept, "share"),
         Row(f"gaze.crossing_worst_deg{suffix}", quantile([float(e.max()) for e in during], 0.5), "deg"),

@@ -133,16 +133,17 @@ def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np
     """Return how the head sees in this run."""
     boxes = scenario.given in ("boxes", "pairs", "class")
     frame_rate = scenario.given == "pairs"
+    frame_ticks = round(1.0 / (TICK_S * realism.frame_rate_hz))
     return Seeing(
         latency_s=setting.latency_ms * 1e-3,
-        frame_ticks=round(300.0 / realism.frame_rate_hz),
+        frame_ticks=frame_ticks,
         skew_ticks=int(random.integers(0, 6)),
         noise_px=realism.noise_px,
         stamp_error_s=random.uniform(-realism.stamp_error_s, realism.stamp_error_s),
         track=not boxes or scenario.given == "class",
         fovea=True,
         boxes=boxes,
-        box_frame_ticks=10 if frame_rate else round(300.0 / realism.box["rate_hz"]),
+        box_frame_ticks=frame_ticks if frame_rate else round(300.0 / realism.box["rate_hz"]),
         box_latency_s=setting.latency_ms * 1e-3 + (0.0 if frame_rate else realism.box["latency_s"]),
         box_noise_px=realism.noise_px if frame_rate else realism.box["noise_px"],
         box_miss_share=0.0 if frame_rate else 0.05,
@@ -150,7 +151,7 @@ def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np
 
 
 @lru_cache(maxsize=1)
-def _simulator() -> Simulator:
+def world() -> Simulator:
     """One world serves every run: only where its hinges are set matters, and that is set anew at every look."""
     return Simulator(SimParameters(), default_rig(), render=False)
 
@@ -160,7 +161,7 @@ class SimulatedHead(FakeHead):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._simulator = _simulator()
+        self._simulator = world()
         self._posed_at = math.nan
 
     def project(self, point_m: Array, left: bool) -> Array:
@@ -213,7 +214,7 @@ def run(
 def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Trace:
     arrived: list[Observation] = []
     samples: list[tuple[float, Array, Array, Array, bool, int, tuple[float, float, float], float]] = []
-    first_result_s, travel_s, ticks, begun = math.inf, 0.0, 0, False
+    first_result_s, way_s, ticks, begun = math.inf, 0.0, 0, False
     reading: EyeRotationReading | None = None
     while head.time_s < scenario.duration_s:
         arrived += head.advance()
@@ -230,7 +231,7 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
             begun = True
         if math.isinf(first_result_s) and any(_shows_target(observation) for observation in arrived):
             first_result_s = now_s
-            travel_s = _travel_s(head)
+            way_s = travel_s(head.true_errors_rad(), head.rig)
         if scenario.encoder is not None and ticks % ENCODER_TICKS == 0:
             reading = scenario.encoder(head)
         if reading is not None and ticks % ENCODER_TICKS == ENCODER_LATENCY_TICKS:
@@ -267,7 +268,7 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
         distance_m=np.array(columns[6]),
         step_s=np.array(columns[7]),
         first_result_s=first_result_s,
-        travel_s=travel_s,
+        travel_s=way_s,
     )
 
 
@@ -286,11 +287,11 @@ def _shows_target(observation: Observation) -> bool:
     return isinstance(observation, BoxSighting) and observation.usable
 
 
-def _travel_s(head: FakeHead) -> float:
-    """How long the servos need at full speed, all at once, from here to the target."""
-    version, vergence, tilt = head.true_errors_rad()
+def travel_s(errors_rad: Array, rig: Rig) -> float:
+    """Return how long the servos need at full speed, all at once, over errors of version, vergence and tilt (3,)."""
+    version, vergence, tilt = errors_rad
     ways = np.abs([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
-    speeds = np.array([joint.servo.speed_rad_s for _, joint in head.rig.joints.items()])
+    speeds = np.array([joint.servo.speed_rad_s for _, joint in rig.joints.items()])
     return float((ways / speeds).max())
 
 

@@ -2,60 +2,47 @@
 
 import contextlib
 import math
-import os
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import JointState
 
-from bench.gaze_runs import SERVOS, Scenario, Trace
+from bench.gaze_runs import Scenario, Trace, travel_s
 from bench.harness import OUT_DIR
 from vergence_bringup.demo import head_nodes
 from vergence_bringup.demo_recorder import Recorder, Stamped
+from vergence_bringup.demo_stage import Stage, of_class
 from vergence_bringup.processes import ProcessGroup, config_dir
 from vergence_common.domains import own_domain
-from vergence_common.stamps import to_nanoseconds
+from vergence_common.stamps import to_seconds
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence
-from vergence_rig.rig import JOINT_NAMES
+from vergence_rig.rig import JOINT_NAMES, Rig, load_rig
 
 Array = npt.NDArray[np.float64]
 Point = Sequence[float] | Array
 
 SERVO = "sg90"
 TARGET = "cube"
-_OUT_OF_SIGHT_M = (10.0, 0.0, -10.0)
-_SETTLE_S = 0.7
-_READY_WITHIN_S = 60.0
+_LIMIT_S = 10.0
 
 
 class ProcessHead:
     """One head at a time; `open_head` makes it. Times of traces count from when the goal was sent."""
 
-    def __init__(self, recorder: Recorder, nodes: ProcessGroup) -> None:
-        self._recorder, self._alive = recorder, nodes.check
-        self._places = {
-            what: recorder.node.create_publisher(PointStamped, f"sim/{what}_pose", 10)
-            for what in ("target", "occluder")
-        }
+    def __init__(self, recorder: Recorder, nodes: ProcessGroup, rig: Rig) -> None:
+        self._recorder, self._alive, self._rig = recorder, nodes.check, rig
+        self._stage = Stage(recorder, nodes.check, ("target", "occluder"))
         self._joints = recorder.listen(JointState, "ground_truth/joint_states", nodes.check)
-        for what, heard in (
-            ("ground truth from sim_node", lambda: recorder.truths and self._joints),
-            ("vergence/edge", lambda: recorder.edges),
-            ("vergence/box", lambda: recorder.boxes),
-            ("gaze/state", lambda: recorder.states),
-            ("sim_node to take places", lambda: all(p.get_subscription_count() for p in self._places.values())),
-        ):
-            recorder.wait_for(what, heard, _READY_WITHIN_S, nodes.check)
+        self._stage.wait_until_ready()
+        recorder.wait_for("ground_truth/joint_states", lambda: self._joints, 40.0, nodes.check)
 
     def at_rest(self, scenario: Scenario) -> Trace:
         """Run a scenario whose target rests, from its start pose; it is given as the scenario says."""
         self._prepare(scenario)
-        goal = _of_class() if scenario.given == "class" else self._two_clicks()
+        goal = of_class(TARGET, _LIMIT_S) if scenario.given == "class" else self._two_clicks()
         began_s, mark = self._recorder.now_s(), len(self._recorder.boxes)
         self._recorder.look_at(goal, self._alive)
         self._run_until(began_s + scenario.duration_s)
@@ -71,49 +58,45 @@ class ProcessHead:
         """Run a scenario with the occluder before the target, at 0.6 of its distance, for a while."""
         self._prepare(scenario)
         began_s = self._recorder.now_s()
-        self._recorder.look_at(_of_class(), self._alive)
+        self._recorder.look_at(of_class(TARGET, _LIMIT_S), self._alive)
         self._run_until(began_s + from_s)
-        self._put("occluder", 0.6 * np.asarray(scenario.target(0.0)))
+        self._stage.put("occluder", 0.6 * np.asarray(scenario.target(0.0)))
         self._run_until(began_s + until_s)
-        self._put("occluder", _OUT_OF_SIGHT_M)
+        self._stage.hide("occluder")
         self._run_until(began_s + scenario.duration_s)
         return self._trace(began_s, scenario.duration_s, math.nan)
 
     def pursuing(self, scenario: Scenario, velocity_m_s: Point, moves_from_s: float) -> Trace:
         """Run a scenario whose target moves at a constant velocity from `moves_from_s` to the end."""
         self._prepare(scenario)
-        self._recorder.look_at(_of_class(), self._alive)
-        self._recorder.settle(_SETTLE_S, self._alive)
+        self._recorder.look_at(of_class(TARGET, _LIMIT_S), self._alive)
+        self._stage.settle()
         x, y, z = (float(value) for value in velocity_m_s)
         ramp = {"motion": "ramp", "motion_x_m": x, "motion_y_m": y, "motion_z_m": z}
         began_s = self._recorder.now_s() - moves_from_s
         self._recorder.set_parameters("sim_node", ramp, self._alive)
         self._run_until(began_s + scenario.duration_s)
         trace = self._trace(began_s, scenario.duration_s, math.nan)
-        self._put("target", _OUT_OF_SIGHT_M)
+        self._stage.hide("target")
         self._recorder.set_parameters("sim_node", {"motion": "static"}, self._alive)
         return trace
 
     def latency_s(self) -> float:
         """Return how old a pair is when its metric arrives, the median of all that came."""
-        ages = [e.arrival_s - to_nanoseconds(e.message.header.stamp) * 1e-9 for e in self._recorder.edges]
+        ages = [e.arrival_s - to_seconds(e.message.header.stamp) for e in self._recorder.edges]
         return float(np.median(ages))
 
     def _prepare(self, scenario: Scenario) -> None:
         """Send the eyes to the start with nothing to see there, then show the target and wait for it."""
         recorder, pose = self._recorder, scenario.start_rad
-        for what in self._places:
-            self._put(what, _OUT_OF_SIGHT_M)
-        goal = LookAt.Goal(kind=LookAt.Goal.ANGLES, time_limit_s=5.0, tilt_rad=pose["tilt"])
-        goal.version_rad = 0.5 * (pose["pan_left"] + pose["pan_right"])
-        goal.vergence_rad = pose["pan_right"] - pose["pan_left"]
-        recorder.look_at(goal, self._alive)
-        recorder.settle(_SETTLE_S, self._alive)
-        self._put("target", scenario.target(0.0))
+        self._stage.clear()
+        left, right = pose["pan_left"], pose["pan_right"]
+        self._stage.send_eyes(0.5 * (left + right), right - left, pose["tilt"])
+        self._stage.put("target", scenario.target(0.0))
         shown_s = recorder.now_s()
         recorder.wait_for(
             "the truth of the target in its place",
-            lambda: to_nanoseconds(recorder.truths[-1].message.header.stamp) * 1e-9 > shown_s + 0.02,
+            lambda: to_seconds(recorder.truths[-1].message.header.stamp) > shown_s + 0.02,
             5.0,
             self._alive,
         )
@@ -121,17 +104,11 @@ class ProcessHead:
     def _two_clicks(self) -> LookAt.Goal:
         """Return the goal of a person who clicks on the target in both images."""
         truth = self._recorder.truths[-1].message
-        goal = LookAt.Goal(kind=LookAt.Goal.STEREO_PIXEL, time_limit_s=10.0)
+        goal = LookAt.Goal(kind=LookAt.Goal.STEREO_PIXEL, time_limit_s=_LIMIT_S)
         goal.header.stamp = truth.header.stamp
         goal.left_x_px, goal.left_y_px = float(round(truth.left_x_px)), float(round(truth.left_y_px))
         goal.right_x_px, goal.right_y_px = float(round(truth.right_x_px)), float(round(truth.right_y_px))
         return goal
-
-    def _put(self, what: str, place_m: Point) -> None:
-        message = PointStamped()
-        message.header.frame_id = "rig_base"
-        message.point.x, message.point.y, message.point.z = (float(value) for value in place_m)
-        self._places[what].publish(message)
 
     def _run_until(self, time_s: float) -> None:
         self._recorder.settle(time_s - self._recorder.now_s(), self._alive)
@@ -155,39 +132,37 @@ class ProcessHead:
             distance_m=np.array([_distance_of(entry.message) for entry in states]),
             step_s=np.full(time_s.size, math.nan),
             first_result_s=first_result_s,
-            travel_s=_travel_s(errors, time_s, first_result_s),
+            travel_s=self._travel_s(errors, time_s, first_result_s),
         )
+
+    def _travel_s(self, errors_rad: Array, time_s: Array, first_result_s: float) -> float:
+        """Return how long the servos need from where they are at the first result; NaN for none."""
+        if not math.isfinite(first_result_s):
+            return math.nan
+        return travel_s(errors_rad[min(int(np.searchsorted(time_s, first_result_s)), time_s.size - 1)], self._rig)
 
 
 @contextlib.contextmanager
 def open_head() -> Iterator[ProcessHead]:
     """Start a head of its own DDS domain and end it."""
-    outer = os.environ.get("ROS_DOMAIN_ID")
-    with own_domain() as domain:
-        os.environ["ROS_DOMAIN_ID"] = str(domain)
+    path = config_dir() / "rig.yaml"
+    with (
+        own_domain() as domain,
+        ProcessGroup(OUT_DIR / "gaze_graph_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes,
+    ):
+        for name, command in head_nodes(path).items():
+            nodes.start(name, command)
+        recorder = Recorder(domain)
         try:
-            with ProcessGroup(OUT_DIR / "gaze_graph_logs") as nodes:
-                for name, command in head_nodes(Path(config_dir()) / "rig.yaml").items():
-                    nodes.start(name, command)
-                recorder = Recorder()
-                try:
-                    yield ProcessHead(recorder, nodes)
-                finally:
-                    recorder.close()
+            yield ProcessHead(recorder, nodes, load_rig(path))
         finally:
-            os.environ.pop("ROS_DOMAIN_ID")
-            if outer is not None:
-                os.environ["ROS_DOMAIN_ID"] = outer
-
-
-def _of_class() -> LookAt.Goal:
-    return LookAt.Goal(kind=LookAt.Goal.CLASS, class_name=TARGET, time_limit_s=10.0)
+            recorder.close()
 
 
 def _at(time_s: Array, began_s: float, series: Sequence[Stamped], values_of: Any) -> Array:
     """Return a topic's values (n, k) at times, linear between its stamps."""
     lately = [e for e in series if e.arrival_s > began_s - 1.0]
-    stamps = np.array([to_nanoseconds(e.message.header.stamp) * 1e-9 - began_s for e in lately])
+    stamps = np.array([to_seconds(e.message.header.stamp) - began_s for e in lately])
     values = np.array([values_of(e.message) for e in lately])
     return np.column_stack([np.interp(time_s, stamps, column) for column in values.T])
 
@@ -208,12 +183,3 @@ def _wanted_of(truth: Any) -> list[float]:
 
 def _distance_of(state: Any) -> tuple[float, float, float]:
     return state.distance_m, state.distance_low_m, state.distance_high_m
-
-
-def _travel_s(errors_rad: Array, time_s: Array, first_result_s: float) -> float:
-    """Return how long the servos need at full speed from where they are at the first result; NaN for none."""
-    if not math.isfinite(first_result_s):
-        return math.nan
-    version, vergence, tilt = errors_rad[min(int(np.searchsorted(time_s, first_result_s)), time_s.size - 1)]
-    ways = np.abs([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
-    return float(ways.max()) / SERVOS[SERVO].speed_rad_s

@@ -53,9 +53,10 @@ def _pair_of(message: Any) -> tuple[int, float]:
 class Recorder:
     """A node in a thread of its own; the demo's main thread waits on what arrives."""
 
-    def __init__(self) -> None:
+    def __init__(self, domain_id: int | None = None) -> None:
+        """Listen in a DDS domain; None for the environment's."""
         if not rclpy.ok():
-            rclpy.init()
+            rclpy.init(domain_id=domain_id)
         self.node = Node("vergence_demo")
         self._changed = threading.Condition()
         self.states: list[Stamped] = []

@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PointStamped
 
 from vergence_bringup.box_figures import BoxFigures
 from vergence_bringup.demo_recorder import Recorder, Stamped, StereoPicture
 from vergence_bringup.demo_result import Floats, MetricTable, Series, StationResult
+from vergence_bringup.demo_stage import Stage, of_class
 from vergence_bringup.demo_stations import Station
 from vergence_bringup.pictures import Image, combined_edges, with_box, with_cross, with_windows, write_image
-from vergence_common.stamps import to_nanoseconds
+from vergence_common.stamps import to_seconds
 from vergence_metric.edge_metric import EdgeMetric
 from vergence_metric.edge_parameters import EdgeMetricParameters
 from vergence_msgs.action import LookAt
@@ -24,8 +24,6 @@ from vergence_rig.rig import Rig
 _FOVEA_HALF_PX = 25.0
 _LIMIT_S = 12.0
 _GO_ALONG_S = 1.0
-_SETTLE_S = 0.7
-_OUT_OF_SIGHT_M = (10.0, 0.0, -10.0)
 
 
 def tolerance_deg(rig: Rig, ideal: bool) -> float:
@@ -45,20 +43,11 @@ class StationRunner:
         self._tolerance_deg = tolerance_deg
         self._out_dir = out_dir
         self._edge_metric = EdgeMetric(EdgeMetricParameters())
-        self._places = {
-            what: recorder.node.create_publisher(PointStamped, f"sim/{what}_pose", 10)
-            for what in ("target", "distractor")
-        }
+        self._stage = Stage(recorder, alive, ("target", "distractor"))
 
     def wait_until_ready(self) -> None:
         """Wait until every node has been heard."""
-        recorder = self._recorder
-        recorder.wait_for("ground truth from sim_node", lambda: recorder.truths, 40.0, self._alive)
-        recorder.wait_for("vergence/edge from edge_metric_node", lambda: recorder.edges, 40.0, self._alive)
-        recorder.wait_for("gaze/state from gaze_controller_node", lambda: recorder.states, 40.0, self._alive)
-        recorder.wait_for("vergence/box from box_metric_node", lambda: recorder.boxes, 40.0, self._alive)
-        for what, publisher in self._places.items():
-            recorder.wait_for(f"sim_node to take sim/{what}_pose", publisher.get_subscription_count, 20.0, self._alive)
+        self._stage.wait_until_ready()
 
     def visit(self, station: Station) -> StationResult:
         """Show the target, ask the graph to look at it, and return what happened.
@@ -66,15 +55,18 @@ class StationRunner:
         The goal is a click on the left image, as a person would give it, or the target's class.
         """
         recorder = self._recorder
-        for what in self._places:
-            self._show(what, _OUT_OF_SIGHT_M)  # until the eyes are at the start
+        self._stage.clear()  # until the eyes are at the start
         recorder.set_parameters("gaze_controller_node", {"mode": "both_eyes"}, self._alive)
-        self._look_at_angles(station)
-        recorder.settle(_SETTLE_S, self._alive)
+        self._stage.send_eyes(
+            math.radians(station.start_version_deg),
+            math.radians(station.start_vergence_deg),
+            math.radians(station.start_tilt_deg),
+        )
         recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._alive)
         recorder.set_parameters("sim_node", {"target": station.target}, self._alive)
-        self._show("distractor", station.distractor_m or _OUT_OF_SIGHT_M)
-        self._show("target", station.place_m or self._fixation_m())
+        if station.distractor_m:
+            self._stage.put("distractor", station.distractor_m)
+        self._stage.put("target", station.place_m or self._fixation_m())
         shown_at = recorder.now_s()
         truth = recorder.wait_for(
             f"{station.target} in both views", lambda: self._seen(station, shown_at), 10.0, self._alive
@@ -84,7 +76,7 @@ class StationRunner:
 
         began = recorder.now_s()
         marks = len(recorder.states), len(recorder.edges), len(recorder.truths), len(recorder.boxes)
-        goal = _of_class(station.target) if station.by_class else _click(truth)
+        goal = of_class(station.target, _LIMIT_S) if station.by_class else _click(truth)
         result = recorder.look_at(goal, self._alive, _LIMIT_S + 10.0)
         reason = "" if result.result == LookAt.Result.VERGED else result.reason
         if station.moving:
@@ -97,20 +89,6 @@ class StationRunner:
         if station.moving:
             recorder.set_parameters("sim_node", {"motion": "static"}, self._alive)
         return self._result(station, began, marks, reason, before, after)
-
-    def _show(self, what: str, place_m: Sequence[float]) -> None:
-        message = PointStamped()
-        message.header.stamp = self._recorder.node.get_clock().now().to_msg()
-        message.header.frame_id = "rig_base"
-        message.point.x, message.point.y, message.point.z = (float(value) for value in place_m)
-        self._places[what].publish(message)
-
-    def _look_at_angles(self, station: Station) -> None:
-        goal = LookAt.Goal(kind=LookAt.Goal.ANGLES, time_limit_s=5.0)
-        goal.version_rad = math.radians(station.start_version_deg)
-        goal.vergence_rad = math.radians(station.start_vergence_deg)
-        goal.tilt_rad = math.radians(station.start_tilt_deg)
-        self._recorder.look_at(goal, self._alive)
 
     def _fixation_m(self) -> Sequence[float]:
         """Return where the graph itself says that the axes meet, now that the eyes are still."""
@@ -127,7 +105,7 @@ class StationRunner:
     def _seen(self, station: Station, since_s: float) -> Any:
         entry = self._recorder.truths[-1]
         truth = entry.message
-        exposed_s = to_nanoseconds(truth.header.stamp) * 1e-9
+        exposed_s = to_seconds(truth.header.stamp)
         inside = truth.target == station.target and exposed_s > since_s
         return truth if inside and min(truth.left_visible_share, truth.right_visible_share) > 0.2 else None
 
@@ -207,11 +185,6 @@ def _click(truth: Any) -> LookAt.Goal:
     return goal
 
 
-def _of_class(name: str) -> LookAt.Goal:
-    """Return the goal of one who knows what to look at and not where it is: the detector's class."""
-    return LookAt.Goal(kind=LookAt.Goal.CLASS, class_name=name, time_limit_s=_LIMIT_S)
-
-
 def _boxed(view: Image, box: Any) -> Image:
     """Return the view with a BoundingBox drawn on it, if there is one."""
     if box is None or not math.isfinite(box.x_min_px):
@@ -236,7 +209,7 @@ def _series(
     boxes: Sequence[Stamped],
 ) -> Series:
     def stamps(entries: Sequence[Stamped]) -> Floats:
-        return np.array([to_nanoseconds(entry.message.header.stamp) * 1e-9 - began_s for entry in entries])
+        return np.array([to_seconds(entry.message.header.stamp) - began_s for entry in entries])
 
     column = 0
     if edges:
