@@ -127,10 +127,14 @@ class Recorder:
     def look_at(self, goal: LookAt.Goal, alive: Callable[[], None], timeout_s: float = 30.0) -> LookAt.Result:
         """Send a goal and return its result."""
         self.wait_for("the action gaze/look_at", self._look_at.server_is_ready, 20.0, alive)
-        handle = self._future("gaze/look_at to accept a goal", self._look_at.send_goal_async(goal), 5.0, alive)
+        # Both are asked in the executor's own thread: an answer that it takes before the asking thread has noted the
+        # question is thrown away by rclpy.
+        asked = self._in_executor(lambda: self._look_at.send_goal_async(goal), alive)
+        handle = self._future("gaze/look_at to accept a goal", asked, 5.0, alive)
         if not handle.accepted:
             raise GraphError("gaze/look_at refused the goal")
-        return self._future("gaze/look_at to end", handle.get_result_async(), timeout_s, alive).result
+        ending = self._in_executor(handle.get_result_async, alive)
+        return self._future("gaze/look_at to end", ending, timeout_s, alive).result
 
     def set_parameters(self, node_name: str, values: dict[str, Any], alive: Callable[[], None]) -> None:
         """Set parameters of a running node, all at once; raises GraphError with its reason if it refuses."""
@@ -169,9 +173,9 @@ class Recorder:
             self._in_executor(self._unsubscribe_from_images, alive)
         return StereoPicture(image_to_array(left).copy(), image_to_array(right).copy(), edge, box)
 
-    def _in_executor(self, work: Callable[[], None], alive: Callable[[], None]) -> None:
+    def _in_executor(self, work: Callable[[], Any], alive: Callable[[], None]) -> Any:
         # Entities must not come and go under the executor while it waits for them.
-        self._future("the recorder's own thread", self._executor.create_task(work), 5.0, alive)
+        return self._future("the recorder's own thread", self._executor.create_task(work), 5.0, alive)
 
     def _subscribe_to_images(self) -> None:
         self._image_subscriptions = [
