@@ -11,12 +11,12 @@ import numpy as np
 
 from bench.box_graph import measure_rates
 from bench.harness import Row
-from tools.train_detector.average_precision import iou_matrix
-from tools.train_detector.scenes import Stage
-from vergence_metric.box_parameters import BoxMetricNodeParameters
+from training.average_precision import iou_matrix
+from training.scenes import Stage
 from vergence_metric.boxes import BoxMeasurement, BoxStatus, BoxVergenceResult
 from vergence_metric.boxes.association import associate
 from vergence_metric.boxes.pair_geometry import PairGeometry
+from vergence_metric.boxes.parameters import BoxMetricNodeParameters
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, from_version_vergence, gaze_for_point
 from vergence_rig.rig import default_rig

@@ -26,7 +26,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage
 
 from bench.harness import Row
-from vergence_bringup.processes import NodeCommand, environment
+from vergence_bringup.ros.processes import NodeCommand, environment
 from vergence_camera.sources.recordings import AviRecording
 from vergence_common.domains import own_domain
 from vergence_common.qos import IMAGE_QOS

@@ -22,8 +22,8 @@ from bench.edge_scenes import (
 )
 from bench.harness import Row
 from bench.rendered_scenes import frames
-from vergence_metric.edge_metric import EdgeMetric, EdgeMetricResult
-from vergence_metric.edge_parameters import EdgeMetricParameters
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_sim.parameters import SimParameters
 
 JUDGING = EdgeMetricParameters(windows_px=(50, 100), align="none")

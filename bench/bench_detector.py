@@ -15,10 +15,10 @@ import onnxruntime
 from onnx import TensorProto, helper, numpy_helper
 
 from bench.harness import Row
-from tools.train_detector.average_precision import ImageResult, average_precision, mean_average_precision
-from tools.train_detector.scenes import Stage, View
-from vergence_metric.box_parameters import DetectorParameters
+from training.average_precision import ImageResult, average_precision, mean_average_precision
+from training.scenes import Stage, View
 from vergence_metric.boxes import Detector
+from vergence_metric.boxes.parameters import DetectorParameters
 
 TARGET_SEEDS = range(950_000, 950_010)
 EMPTY_SEEDS = range(960_000, 960_010)

@@ -13,8 +13,8 @@ from bench.fovea_scenes import scenes
 from bench.harness import Row
 from bench.textured_pairs import Pair, clean, deceptive, hard
 from vergence_metric.disparity import make_estimator
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.registry import names
-from vergence_metric.fovea_parameters import DisparityParameters
 
 Image = NDArray[np.uint8]
 Point = tuple[float, float]

@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bench.harness import Row
-from vergence_metric.chance import chance_levels
-from vergence_metric.contrast import contrasts, foveal_contrast
-from vergence_metric.edge_distance import EdgeDistances, edge_distances
-from vergence_metric.edge_metric import EdgeMetric
-from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.edges import Edges, detect_edges
-from vergence_metric.nearest_edges import NearestEdges
-from vergence_metric.oriented_edges import oriented_field
-from vergence_metric.robust import robust_distances
-from vergence_metric.windows import Window, centre_windows
+from vergence_metric.edges.chance import chance_levels
+from vergence_metric.edges.contrast import contrasts, foveal_contrast
+from vergence_metric.edges.edge_distance import EdgeDistances, edge_distances
+from vergence_metric.edges.edges import Edges, detect_edges
+from vergence_metric.edges.nearest_edges import NearestEdges
+from vergence_metric.edges.oriented_edges import oriented_field
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.robust import robust_distances
+from vergence_metric.edges.windows import Window, centre_windows
+from vergence_metric.measurement.edge_metric import EdgeMetric
 
 Mask = NDArray[np.uint8]
 

@@ -23,7 +23,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from bench.harness import OUT_DIR, Row
-from vergence_bringup.processes import NodeCommand, ProcessGroup
+from vergence_bringup.ros.processes import NodeCommand, ProcessGroup
 from vergence_common.domains import own_domain
 from vergence_common.qos import STATE_QOS
 from vergence_common.stamps import to_nanoseconds

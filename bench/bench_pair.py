@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.harness import Row
-from vergence_metric.pairing import LEFT, RIGHT, StereoPairer
-from vergence_metric.pairing_parameters import PairingParameters
+from vergence_metric.pairs.pairing import LEFT, RIGHT, StereoPairer
+from vergence_metric.pairs.parameters import PairingParameters
 
 MS = 1_000_000
 PERIOD_NS = round(1e9 / 30)

@@ -123,7 +123,7 @@ def _piped_node(root: Path, domain: int) -> Iterator[int]:
         "servos": CONFIG / "servos.yaml",
         "pose_file": root / "pose.json",
     }
-    argv = [sys.executable, "-m", "vergence_servo.servo_node", "--ros-args"]
+    argv = [sys.executable, "-m", "vergence_servo.ros.servo_node", "--ros-args"]
     argv += ["--params-file", str(CONFIG / "servo_node.yaml")]
     argv += [part for name, value in values.items() for part in ("-p", f"{name}:={value}")]
     process = subprocess.Popen(argv, env=os.environ | {"ROS_DOMAIN_ID": str(domain)})

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.fovea_scenes import scenes
 from bench.harness import Row
-from vergence_metric.zero_disparity import zero_disparity
+from vergence_metric.tracking.zero_disparity import zero_disparity
 
 _SCENES = 80
 _MISVERGED_PX = 0.5  # as good as the vergence of a head that fixates

@@ -8,7 +8,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from vergence_bringup.processes import NodeCommand, ProcessGroup
+from vergence_bringup.ros.processes import NodeCommand, ProcessGroup
 from vergence_common.domains import own_domain
 from vergence_common.qos import STATE_QOS
 from vergence_msgs.msg import BoxVergence, EdgeVergence
@@ -20,7 +20,7 @@ _GRAPH = (
     ("vergence_sim", "sim_node"),
     ("vergence_metric", "edge_metric_node"),
     ("vergence_metric", "box_metric_node"),
-    ("vergence_servo", "gaze_controller_node"),
+    ("vergence_gaze", "gaze_controller_node"),
 )
 
 

@@ -9,15 +9,15 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from vergence_gaze.estimation.observations import EyeRotationReading
+from vergence_gaze.testing.fake_head import FakeHead
 from vergence_metric.eye_rotation.encoder import EyeRotationReading as Reading
 from vergence_metric.eye_rotation.encoder import VisualEncoder
+from vergence_metric.eye_rotation.parameters import EyeRotationNodeParameters
 from vergence_metric.eye_rotation.relative_rotation import RigDoubt, relative_rotation
-from vergence_metric.eye_rotation_parameters import EyeRotationNodeParameters
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, rotation_rig_from_eye
 from vergence_rig.rig import JOINT_NAMES, Rig
-from vergence_servo.gaze.fake_head import FakeHead
-from vergence_servo.gaze.observations import EyeRotationReading
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
 

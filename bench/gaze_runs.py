@@ -10,14 +10,14 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from vergence_gaze.control.controller import GazeController
+from vergence_gaze.estimation.observations import BoxSighting, EyeRotationReading, Observation
+from vergence_gaze.goals.goal import Goal, GoalKind
+from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.phases import Phase
+from vergence_gaze.testing.fake_head import TICK_S, FakeHead, Seeing
 from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
-from vergence_servo.gaze.controller import GazeController
-from vergence_servo.gaze.fake_head import TICK_S, FakeHead, Seeing
-from vergence_servo.gaze.goals import Goal, GoalKind
-from vergence_servo.gaze.observations import BoxSighting, EyeRotationReading, Observation
-from vergence_servo.gaze.parameters import GazeParameters
-from vergence_servo.gaze.phases import Phase
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
 

@@ -11,10 +11,10 @@ from sensor_msgs.msg import JointState
 
 from bench.gaze_runs import Scenario, Trace, travel_s
 from bench.harness import OUT_DIR
-from vergence_bringup.demo import head_nodes
-from vergence_bringup.demo_recorder import Recorder, Stamped
-from vergence_bringup.demo_stage import Stage, of_class
-from vergence_bringup.processes import ProcessGroup, config_dir
+from vergence_bringup.demo.ros.command import head_nodes
+from vergence_bringup.demo.ros.recorder import Recorder, Stamped
+from vergence_bringup.demo.ros.stage import Stage, of_class
+from vergence_bringup.ros.processes import ProcessGroup, config_dir
 from vergence_common.domains import own_domain
 from vergence_common.stamps import to_seconds
 from vergence_msgs.action import LookAt

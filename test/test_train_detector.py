@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tools.train_detector.augmentation import Strength, closer_look, part_of
-from tools.train_detector.average_precision import ImageResult, average_precision, iou_matrix, mean_average_precision
-from tools.train_detector.evaluation import Scores
-from tools.train_detector.head_views import head_views
-from tools.train_detector.labels import label
-from tools.train_detector.look_alikes import KINDS, SMALLEST_PX, faces
-from vergence_metric.box_parameters import DetectorParameters
+from training.augmentation import Strength, closer_look, part_of
+from training.average_precision import ImageResult, average_precision, iou_matrix, mean_average_precision
+from training.evaluation import Scores
+from training.head_views import head_views
+from training.labels import label
+from training.look_alikes import KINDS, SMALLEST_PX, faces
 from vergence_metric.boxes import Detector
+from vergence_metric.boxes.parameters import DetectorParameters
 
 FOCAL_PX = 500.0
 SHAPE = (480, 640)

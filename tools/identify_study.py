@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vergence_calibration.identification.axis_log import EYES, AxisLog, EyeCamera, Frames, IdentifyParameters, Move
+from vergence_calibration.identification.identification import Identification, identify
+from vergence_calibration.identification.pose import pose_with_room
+from vergence_calibration.identification.seen_motion import shrunk
 from vergence_rig.camera import CameraModel
 from vergence_rig.rig import JOINT_NAMES
-from vergence_servo.identifying.axis_log import EYES, AxisLog, EyeCamera, Frames, IdentifyParameters, Move
-from vergence_servo.identifying.identification import Identification, identify
-from vergence_servo.identifying.pose import pose_with_room
-from vergence_servo.identifying.seen_motion import shrunk
 from vergence_sim.parameters import SimParameters
 from vergence_sim.real_time import Schedule
 from vergence_sim.simulator import Simulator

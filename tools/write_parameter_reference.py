@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from vergence_bringup.executables import EXECUTABLES, parameter_groups
+from vergence_bringup.node_table import EXECUTABLES, parameter_groups
 from vergence_rig.parameters import ParameterSpec
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "parameters.md"

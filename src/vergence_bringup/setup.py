@@ -18,7 +18,7 @@ setup(
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="Vergence maintainers",
-    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    maintainer_email="vergence-maintainers@example.org",
     description="Launch files, URDF, the vergence command line, demo and report.",
     license="Apache-2.0",
     entry_points={

@@ -12,12 +12,12 @@ setup(
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="Vergence maintainers",
-    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    maintainer_email="vergence-maintainers@example.org",
     description="One USB webcam to topics; two instances make the pair.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "camera_node = vergence_camera.camera_node:main",
+            "camera_node = vergence_camera.ros.camera_node:main",
             "list_cameras = vergence_camera.list_cameras:main",
         ]
     },

@@ -12,14 +12,14 @@ setup(
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="Vergence maintainers",
-    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    maintainer_email="vergence-maintainers@example.org",
     description="Synchronised pairs to vergence metrics, signed disparity and the class-free tracker.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "edge_metric_node = vergence_metric.edge_metric_node:main",
-            "box_metric_node = vergence_metric.box_metric_node:main",
-            "eye_rotation_node = vergence_metric.eye_rotation_node:main",
+            "edge_metric_node = vergence_metric.ros.edge_metric_node:main",
+            "box_metric_node = vergence_metric.ros.box_metric_node:main",
+            "eye_rotation_node = vergence_metric.ros.eye_rotation_node:main",
         ]
     },
 )

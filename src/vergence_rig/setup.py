@@ -12,7 +12,7 @@ setup(
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="Vergence maintainers",
-    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    maintainer_email="vergence-maintainers@example.org",
     description="The rig in pure Python: its description, geometry, cameras and servo plants. No ROS in it.",
     license="Apache-2.0",
 )

@@ -12,14 +12,12 @@ setup(
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="Vergence maintainers",
-    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
-    description="Metrics to servos: the gaze control law and the servo drivers.",
+    maintainer_email="vergence-maintainers@example.org",
+    description="Joint commands to servo pulses, safely: drivers, limits, guardian, servo_node: all that a Pi needs.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "gaze_controller_node = vergence_servo.gaze_controller_node:main",
-            "servo_node = vergence_servo.servo_node:main",
-            "calibrate_servos = vergence_servo.calibrate_servos:main",
+            "servo_node = vergence_servo.ros.servo_node:main",
         ]
     },
 )

@@ -12,12 +12,12 @@ setup(
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="Vergence maintainers",
-    maintainer_email="maintainers@users.noreply.h-seed-7aee7c35.example",
+    maintainer_email="vergence-maintainers@example.org",
     description="A binocular head in a furnished room, on MuJoCo: stands in for cameras, servos and world.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "sim_node = vergence_sim.sim_node:main",
+            "sim_node = vergence_sim.ros.sim_node:main",
         ]
     },
 )

@@ -16,8 +16,8 @@ from std_msgs.msg import Header
 from vergence_common.images import array_to_image, image_to_array
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
-from vergence_metric.box_metric_node import BoxMetricNode
 from vergence_metric.boxes import DetectorError
+from vergence_metric.ros.box_metric_node import BoxMetricNode
 from vergence_msgs.msg import BoxVergence, StereoDetections
 
 pytestmark = pytest.mark.graph

@@ -13,8 +13,8 @@ import yaml
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
-from vergence_bringup import calibrate_cameras
-from vergence_bringup.calibrate_cameras_live import LiveViews
+from vergence_bringup.commands import calibrate_cameras
+from vergence_bringup.ros.live_board_views import LiveViews
 from vergence_camera.calibration.boards import Chessboard
 from vergence_camera.calibration.views import ViewCollector
 from vergence_camera.camera_info import load_calibration

@@ -16,9 +16,9 @@ from std_msgs.msg import Header
 from vergence_common.images import array_to_compressed, array_to_image
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
-from vergence_metric.edge_metric import EdgeMetric
-from vergence_metric.edge_metric_node import EdgeMetricNode
-from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
+from vergence_metric.measurement.edge_metric import EdgeMetric
+from vergence_metric.measurement.parameters import EdgeMetricNodeParameters
+from vergence_metric.ros.edge_metric_node import EdgeMetricNode
 from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
 
 pytestmark = pytest.mark.graph

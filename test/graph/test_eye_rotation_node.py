@@ -14,7 +14,7 @@ from std_msgs.msg import Header
 from vergence_common.images import array_to_compressed, array_to_image
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
-from vergence_metric.eye_rotation_node import EyeRotationNode
+from vergence_metric.ros.eye_rotation_node import EyeRotationNode
 from vergence_msgs.msg import EyeRotation
 from vergence_rig.rig import JOINT_NAMES, default_rig
 from vergence_sim.parameters import SimParameters

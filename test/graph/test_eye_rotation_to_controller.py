@@ -9,9 +9,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from vergence_common.stamps import to_stamp
+from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
 from vergence_msgs.msg import EyeRotation
 from vergence_rig.rig import JOINT_NAMES
-from vergence_servo.gaze_controller_node import GazeControllerNode
 
 pytestmark = pytest.mark.graph
 

@@ -21,12 +21,12 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 from vergence_common.stamps import to_stamp
+from vergence_gaze.estimation.observations import EdgeJudgement, FoveaDisparity, JointReport, TrackSighting
+from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
+from vergence_gaze.testing.fake_head import FakeHead
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import EdgeVergence, GazeState, TargetTrack, VergenceError
 from vergence_rig.rig import JOINT_NAMES, default_rig
-from vergence_servo.gaze.fake_head import FakeHead
-from vergence_servo.gaze.observations import EdgeJudgement, FoveaDisparity, JointReport, TrackSighting
-from vergence_servo.gaze_controller_node import GazeControllerNode
 
 pytestmark = pytest.mark.graph
 

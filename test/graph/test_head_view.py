@@ -13,11 +13,11 @@ from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Header
 
+from vergence_calibration.ros import head_view as head_view_node
+from vergence_calibration.ros.head_view import HeadView
+from vergence_calibration.ros.running_head import HeadError
 from vergence_common.images import array_to_image
 from vergence_common.qos import IMAGE_QOS
-from vergence_servo.calibrating import head_view_node
-from vergence_servo.calibrating.head_view_node import HeadView
-from vergence_servo.running_head_node import HeadError
 
 pytestmark = pytest.mark.graph
 

@@ -16,16 +16,16 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from vergence_calibration.identification.axis_log import EYES, IdentifyError, Move
+from vergence_calibration.identification.identified_rig import nodes_text
+from vergence_calibration.ros.identified_head import IdentifiedHead
+from vergence_calibration.ros.running_head import HeadError
 from vergence_common.images import array_to_compressed, array_to_image
 from vergence_common.qos import IMAGE_QOS
+from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
 from vergence_msgs.msg import GazeState
 from vergence_rig.rig import JOINT_NAMES, default_rig
-from vergence_servo.gaze_controller_node import GazeControllerNode
-from vergence_servo.identifying.axis_log import EYES, IdentifyError, Move
-from vergence_servo.identifying.identified_head_node import IdentifiedHead
-from vergence_servo.identifying.identified_rig import nodes_text
-from vergence_servo.running_head_node import HeadError
-from vergence_servo.servo_node import ServoNode
+from vergence_servo.ros.servo_node import ServoNode
 
 pytestmark = pytest.mark.graph
 

@@ -24,7 +24,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from vergence_common.stamps import to_stamp
 from vergence_rig.parameters import ParameterError
 from vergence_servo.drivers.protocol import DriverUnavailableError
-from vergence_servo.servo_node import ServoNode
+from vergence_servo.ros.servo_node import ServoNode
 
 pytestmark = pytest.mark.graph
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
-from vergence_bringup.executables import EXECUTABLES, parameter_groups
+from vergence_bringup.node_table import EXECUTABLES, parameter_groups
 from vergence_rig.parameters import ParameterSpec
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"

@@ -12,7 +12,7 @@ from vergence_common.images import compressed_to_array, image_to_array
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_nanoseconds
 from vergence_msgs.msg import TrueBoxes, TrueVergence
-from vergence_sim.sim_node import SimNode
+from vergence_sim.ros.sim_node import SimNode
 
 pytestmark = [pytest.mark.graph, pytest.mark.usefixtures("opengl")]
 

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from sensor_msgs.msg import CompressedImage
 
-from vergence_bringup.processes import NodeCommand, find_executable
+from vergence_bringup.ros.processes import NodeCommand, find_executable
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_nanoseconds
 

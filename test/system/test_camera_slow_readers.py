@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence_bringup.processes import NodeCommand, environment
+from vergence_bringup.ros.processes import NodeCommand, environment
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(1800)]
 

@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
-from vergence_bringup.processes import find_executable
+from vergence_bringup.ros.processes import find_executable
 
 pytestmark = pytest.mark.system
 

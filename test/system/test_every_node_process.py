@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from vergence_bringup.executables import EXECUTABLES
-from vergence_bringup.processes import find_executable
+from vergence_bringup.node_table import EXECUTABLES
+from vergence_bringup.ros.processes import find_executable
 
 pytestmark = pytest.mark.system
 

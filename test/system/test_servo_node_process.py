@@ -86,7 +86,7 @@ def start(wires: Wires, tmp_path: Path, domain_id: int) -> Iterator[Start]:
 
 def servo_argv(wires: Wires, *more: str) -> list[str]:
     return [
-        *(sys.executable, "-m", "vergence_servo.servo_node", "--ros-args"),
+        *(sys.executable, "-m", "vergence_servo.ros.servo_node", "--ros-args"),
         *("--params-file", str(CONFIG / "servo_node.yaml"), "-p", "backend:=kernel_pwm"),
         *("-p", f"kernel_pwm.root:={wires.root}", "-p", f"servos:={CONFIG / 'servos.yaml'}"),
         *("-p", f"pose_file:={wires.root / 'pose.json'}", *more),
@@ -155,7 +155,7 @@ def test_without_a_guardian_hardware_goes_on_pulsing_and_the_next_start_stops_it
 def test_broken_yaml_ends_it_with_one_line(start: Start, tmp_path: Path, text: str, complaint: str):
     path = tmp_path / "broken.yaml"
     path.write_text(text + "\n")
-    node = start(sys.executable, "-m", "vergence_servo.servo_node", "--ros-args", "--params-file", str(path))
+    node = start(sys.executable, "-m", "vergence_servo.ros.servo_node", "--ros-args", "--params-file", str(path))
     _, errors = node.communicate(timeout=PATIENCE_S)
     assert node.returncode == 2
     assert complaint in errors
@@ -164,7 +164,7 @@ def test_broken_yaml_ends_it_with_one_line(start: Start, tmp_path: Path, text: s
 
 def test_a_bare_start_is_the_fake_and_says_so(start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("ROS_HOME", str(tmp_path))
-    node = start(sys.executable, "-m", "vergence_servo.servo_node")
+    node = start(sys.executable, "-m", "vergence_servo.ros.servo_node")
     assert node.stderr is not None
     assert any("no servo moves" in line for line in node.stderr)
     node.send_signal(signal.SIGINT)

@@ -64,12 +64,12 @@ class Machines:
             "servos": CONFIG / "servos.yaml",
             "pose_file": self._folder / "pose.json",
         } | values
-        argv = ["-m", "vergence_servo.servo_node", "--ros-args", "--params-file", str(CONFIG / "servo_node.yaml")]
+        argv = ["-m", "vergence_servo.ros.servo_node", "--ros-args", "--params-file", str(CONFIG / "servo_node.yaml")]
         argv += [part for name, value in values.items() for part in ("-p", f"{name}:={value}")]
         return self._run(self.cable.pi, argv)
 
     def controller(self) -> "subprocess.Popen[str]":
-        argv = ["-m", "vergence_servo.gaze_controller_node", "--ros-args"]
+        argv = ["-m", "vergence_gaze.ros.gaze_controller_node", "--ros-args"]
         return self._run(self.cable.laptop, [*argv, "--params-file", str(CONFIG / "gaze_controller_node.yaml")])
 
     def target(self, place_m: tuple[float, float, float]) -> "subprocess.Popen[str]":

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 
 import pytest
 
+from vergence_calibration.eye_turn import Image
+from vergence_calibration.servos.visual import VisualParameters, calibrate_head
 from vergence_rig.camera import CameraModel
 from vergence_rig.rig import default_rig
-from vergence_servo.calibrating.visual import VisualParameters, calibrate_head
 from vergence_servo.calibration import default_servos
-from vergence_servo.image_motion import Image
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(180)]
 

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.system
 
 def test_it_draws_the_joints_until_q_is_pressed(domain_id: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("ROS_HOME", str(tmp_path))
-    node = subprocess.Popen([sys.executable, "-m", "vergence_servo.servo_node"], stderr=subprocess.DEVNULL)
+    node = subprocess.Popen([sys.executable, "-m", "vergence_servo.ros.servo_node"], stderr=subprocess.DEVNULL)
     master, slave = pty.openpty()
     # A terminal has a size of its own: readline may have left LINES in this process's environment, behind os.environ.
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 60, 120, 0, 0))

@@ -95,7 +95,7 @@ def generate_launch_description() -> LaunchDescription:
                     node("vergence_metric", "edge_metric_node"),
                     node("vergence_metric", "box_metric_node", "detector", model=text(LaunchConfiguration("model"))),
                     node("vergence_metric", "eye_rotation_node", "encoder"),
-                    node("vergence_servo", "gaze_controller_node"),
+                    node("vergence_gaze", "gaze_controller_node"),
                     node("vergence_servo", "servo_node", "servos"),
                 ]
             ),

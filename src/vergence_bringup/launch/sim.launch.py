@@ -48,7 +48,7 @@ def generate_launch_description() -> LaunchDescription:
                     node("vergence_metric", "edge_metric_node"),
                     node("vergence_metric", "box_metric_node", "detector"),
                     node("vergence_metric", "eye_rotation_node", "encoder"),
-                    node("vergence_servo", "gaze_controller_node"),
+                    node("vergence_gaze", "gaze_controller_node"),
                 ]
             ),
         ]

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence_bringup.box_figures import BoxFigures
-from vergence_bringup.demo_report import write_report
-from vergence_bringup.demo_result import MetricTable, Series, StationResult, summary, table, unfinished, write_summary
-from vergence_bringup.demo_stations import cube_held, marker_80_80, stations
+from vergence_bringup.demo.report import write_report
+from vergence_bringup.demo.result import MetricTable, Series, StationResult, summary, table, unfinished, write_summary
+from vergence_bringup.demo.stations import cube_held, marker_80_80, stations
+from vergence_bringup.figures.boxes import BoxFigures
 
 SETTINGS = {"servo": "sg90", "cameras": "realistic", "duration_s": 1.0}
 

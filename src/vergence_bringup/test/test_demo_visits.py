@@ -7,12 +7,12 @@ import signal
 
 import pytest
 
-from vergence_bringup import demo
 from vergence_bringup.command_line import main
-from vergence_bringup.demo_result import StationResult, unfinished
-from vergence_bringup.demo_stations import stations
-from vergence_bringup.demo_visits import GraphError, visit_all
-from vergence_bringup.processes import ProcessError
+from vergence_bringup.demo.result import StationResult, unfinished
+from vergence_bringup.demo.ros import command as demo
+from vergence_bringup.demo.stations import stations
+from vergence_bringup.demo.visits import GraphError, visit_all
+from vergence_bringup.ros.processes import ProcessError
 
 THREE = stations(0.065, short=True)
 

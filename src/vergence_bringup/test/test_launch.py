@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vergence_bringup.executables import EXECUTABLES
+from vergence_bringup.node_table import EXECUTABLES
 
 pytest.importorskip("launch_ros", reason="launch is not installed here (it comes with ROS from apt)")
 

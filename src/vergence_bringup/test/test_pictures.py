@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vergence_bringup.pictures import (
+from vergence_bringup.figures.pictures import (
     PictureError,
     combined_edges,
     read_image,
@@ -12,7 +12,7 @@ from vergence_bringup.pictures import (
     with_windows,
     write_image,
 )
-from vergence_bringup.plot_svg import Line, plot
+from vergence_bringup.figures.svg_plot import Line, plot
 
 
 def test_round_trip(tmp_path):

@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from vergence_bringup import processes
-from vergence_bringup.processes import NodeCommand, ProcessError, ProcessGroup, find_executable
+from vergence_bringup.ros import processes
+from vergence_bringup.ros.processes import NodeCommand, ProcessError, ProcessGroup, find_executable
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_children_die_with_a_parent_that_is_killed(script, tmp_path):
         [
             sys.executable,
             "-c",
-            "import sys, time\nfrom pathlib import Path\nfrom vergence_bringup import processes\n"
+            "import sys, time\nfrom pathlib import Path\nfrom vergence_bringup.ros import processes\n"
             f"processes.get_package_prefix = lambda package: {str(tmp_path)!r}\n"
             f"group = processes.ProcessGroup(log_dir=Path({str(tmp_path / 'log')!r}))\n"
             f"command = processes.NodeCommand('package', 'child', params_file=Path({str(command.params_file)!r}))\n"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from vergence_bringup.demo_stations import cube_told_apart
+from vergence_bringup.demo.stations import cube_told_apart
 from vergence_metric.boxes import BoxStatus, measure_pair
 from vergence_sim.parameters import SimParameters
 from vergence_sim.renderer import RenderError

@@ -5,7 +5,7 @@ import re
 
 from sensor_msgs.msg import JointState
 
-from vergence_bringup.watch_screen import Screen, Snapshot, Stream
+from vergence_bringup.figures.watch_screen import Screen, Snapshot, Stream
 from vergence_msgs.msg import EdgeVergence, GazeState, VergenceError
 
 TOPICS = ("vergence/edge", "vergence/error", "vergence/box", "gaze/state", "joint_command", "joint_states")

@@ -6,12 +6,15 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
-    "demo": ("demo", "run the whole graph on the simulated head and write a report"),
-    "measure": ("measure", "metric I (and II) of two stored images"),
-    "calibrate": ("calibrate", "calibrate the cameras from chessboard or ChArUco views"),
-    "identify": ("identify", "latencies, pixels per radian and signs of a running head, into its YAML"),
-    "watch": ("watch", "live terminal view of a running graph"),
-    "doctor": ("doctor", "say what is missing on this machine and how to mend it"),
+    "demo": ("vergence_bringup.demo.ros.command", "run the whole graph on the simulated head and write a report"),
+    "measure": ("vergence_bringup.commands.measure", "metric I (and II) of two stored images"),
+    "calibrate": ("vergence_bringup.commands.calibrate", "calibrate the cameras from chessboard or ChArUco views"),
+    "identify": (
+        "vergence_calibration.ros.identify",
+        "latencies, pixels per radian and signs of a running head, into its YAML",
+    ),
+    "watch": ("vergence_bringup.ros.watch", "live terminal view of a running graph"),
+    "doctor": ("vergence_bringup.commands.doctor", "say what is missing on this machine and how to mend it"),
 }
 
 
@@ -24,7 +27,7 @@ def main(args: Sequence[str] | None = None) -> int:
     for name, (module_name, summary) in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=summary, description=summary)
         if name == asked:
-            module = importlib.import_module(f"vergence_bringup.{module_name}")
+            module = importlib.import_module(module_name)
             module.add_arguments(subparser)
             subparser.set_defaults(run=module.run)
     options = parser.parse_args(arguments)

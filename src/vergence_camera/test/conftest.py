@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from vergence_camera.fake_machine import FakeMachine
 from vergence_camera.frame import Frame, ModeRequest
 from vergence_camera.sources.recordings import open_recording
 from vergence_camera.sources.replay import Replay
+from vergence_camera.testing.fake_machine import FakeMachine
 
 Pixels = npt.NDArray[np.uint8]
 

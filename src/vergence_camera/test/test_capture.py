@@ -22,10 +22,10 @@ from vergence_camera.errors import (
 )
 from vergence_camera.frame import Clock, Encoding, ModeRequest
 from vergence_camera.pixels import decode
+from vergence_camera.testing.fake_camera import FakeCamera
+from vergence_camera.testing.fake_kernel import FakeKernel
 from vergence_camera.v4l2 import structures as v4l2
 from vergence_camera.v4l2.capture import V4l2Source
-from vergence_camera.v4l2.fake_camera import FakeCamera
-from vergence_camera.v4l2.fake_kernel import FakeKernel
 from vergence_camera.v4l2.formats import offered_sizes
 
 Make = Callable[..., bytes]

@@ -6,11 +6,11 @@ import pytest
 
 from vergence_camera.control_port import ControlPort
 from vergence_camera.errors import ControlError, DisconnectedError
+from vergence_camera.testing.fake_camera import FakeCamera
+from vergence_camera.testing.fake_controls import FakeControl
+from vergence_camera.testing.fake_kernel import FakeKernel
 from vergence_camera.v4l2 import structures as v4l2
 from vergence_camera.v4l2.controls import Controls
-from vergence_camera.v4l2.fake_camera import FakeCamera
-from vergence_camera.v4l2.fake_controls import FakeControl
-from vergence_camera.v4l2.fake_kernel import FakeKernel
 
 PATH = "/dev/video0"
 NAMES = [

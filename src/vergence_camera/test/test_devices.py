@@ -6,9 +6,9 @@ import pytest
 
 from vergence_camera.devices import Device, PinnedChoice, SystemTree, choose, find_devices, list_devices
 from vergence_camera.errors import AmbiguousCameraError, CameraNotFoundError, ChoiceError
-from vergence_camera.fake_machine import FakeMachine
 from vergence_camera.list_cameras import table
-from vergence_camera.v4l2.fake_kernel import FakeKernel
+from vergence_camera.testing.fake_kernel import FakeKernel
+from vergence_camera.testing.fake_machine import FakeMachine
 
 
 @pytest.fixture

@@ -8,10 +8,10 @@ import pytest
 
 from vergence_camera.devices import SystemTree
 from vergence_camera.doctor import check
-from vergence_camera.fake_machine import FakeMachine
+from vergence_camera.testing.fake_camera import FakeCamera
+from vergence_camera.testing.fake_kernel import FakeKernel
+from vergence_camera.testing.fake_machine import FakeMachine
 from vergence_camera.v4l2 import structures as v4l2
-from vergence_camera.v4l2.fake_camera import FakeCamera
-from vergence_camera.v4l2.fake_kernel import FakeKernel
 from vergence_rig.finding import Finding
 
 

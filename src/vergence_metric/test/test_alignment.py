@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vergence_metric.alignment import Aligner, Alignment
-from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.misalignment import estimate_misalignment
+from vergence_metric.alignment.alignment import Aligner, Alignment
+from vergence_metric.alignment.misalignment import estimate_misalignment
+from vergence_metric.edges.parameters import EdgeMetricParameters
 
 Grey = NDArray[np.uint8]
 CHESSBOARDS = Path(__file__).resolve().parents[4] / "shared" / "data" / "stereo_chessboard"

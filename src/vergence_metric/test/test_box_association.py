@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric.box_parameters import BoxMetricParameters
 from vergence_metric.boxes.appearance import likeness, signature
 from vergence_metric.boxes.association import _best_together, associate
 from vergence_metric.boxes.corner_metric import corner_metric, hidden_sides
 from vergence_metric.boxes.detections import Box
 from vergence_metric.boxes.following import TargetMemory
 from vergence_metric.boxes.pair_geometry import PairGeometry
+from vergence_metric.boxes.parameters import BoxMetricParameters
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, gaze_for_point, rotation_rig_from_optical
 from vergence_rig.rig import default_rig

@@ -8,7 +8,6 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
-from vergence_metric.box_parameters import DetectorParameters
 from vergence_metric.boxes.detector import Detector
 from vergence_metric.boxes.errors import (
     DetectorError,
@@ -17,6 +16,7 @@ from vergence_metric.boxes.errors import (
     ModelFileError,
     ModelLayoutError,
 )
+from vergence_metric.boxes.parameters import DetectorParameters
 
 LAYOUTS = {
     "yolov6": "yolov6",

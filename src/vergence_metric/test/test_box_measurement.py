@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric.box_parameters import BoxMetricNodeParameters
 from vergence_metric.boxes import BoxMeasurement, BoxStatus, DetectorError, draw, measure_pair
 from vergence_metric.boxes.box_overlay import overlay_lines
 from vergence_metric.boxes.detections import Box
+from vergence_metric.boxes.parameters import BoxMetricNodeParameters
 from vergence_metric.boxes.refinement import refine
 from vergence_metric.boxes.smoothing import LagLimitedFilter
 from vergence_metric.boxes.target_point import locate

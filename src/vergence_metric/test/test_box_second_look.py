@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric.box_parameters import DetectorParameters
 from vergence_metric.boxes import Detector
 from vergence_metric.boxes.decoding import Raw
+from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.boxes.second_look import CROP_PX, MOST_LOOKS, Window, look_again
 from vergence_metric.boxes.session import SHIPPED_MODEL
 

@@ -5,11 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vergence_metric.contrast import contrasts, foveal_contrast
-from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.edges import Edges, detect_edges
-from vergence_metric.oriented_edges import OrientedField, oriented_field
-from vergence_metric.windows import Window, centre_windows
+from vergence_metric.edges.contrast import contrasts, foveal_contrast
+from vergence_metric.edges.edges import Edges, detect_edges
+from vergence_metric.edges.oriented_edges import OrientedField, oriented_field
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.windows import Window, centre_windows
 
 
 def picture(seed: int, height: int = 200, width: int = 320) -> NDArray[np.uint8]:

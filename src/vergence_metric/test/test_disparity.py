@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vergence_metric.disparity import DisparityInputError, DisparityStatus, make_estimator
+from vergence_metric.disparity.parameters import ESTIMATORS, DisparityParameters
 from vergence_metric.disparity.registry import names
-from vergence_metric.fovea_parameters import ESTIMATORS, DisparityParameters
 from vergence_rig.parameters import ParameterError
 
 WIDTH, HEIGHT = 640, 480

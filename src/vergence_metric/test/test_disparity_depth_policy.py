@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vergence_metric.disparity import DisparityStatus, make_estimator
-from vergence_metric.fovea_parameters import DisparityParameters
+from vergence_metric.disparity.parameters import DisparityParameters
 
 NEAR, MIDDLE, FAR = 60, 34, 10
 NEAR_BOX, MIDDLE_BOX = (360, 190, 410, 250), (240, 180, 345, 300)

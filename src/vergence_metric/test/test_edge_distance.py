@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vergence_metric.edge_distance import EdgeDistances, WindowStatus, edge_distances
-from vergence_metric.nearest_edges import NearestEdges
-from vergence_metric.windows import Window, centre_windows
+from vergence_metric.edges.edge_distance import EdgeDistances, WindowStatus, edge_distances
+from vergence_metric.edges.nearest_edges import NearestEdges
+from vergence_metric.edges.windows import Window, centre_windows
 
 Mask = NDArray[np.uint8]
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vergence_metric.edge_distance import WindowStatus
-from vergence_metric.edge_metric import EdgeMetric, EdgeMetricResult
-from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.edges import ImageShapeError
+from vergence_metric.edges.edge_distance import WindowStatus
+from vergence_metric.edges.edges import ImageShapeError
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
 
 Grey = NDArray[np.uint8]
 CHESSBOARDS = Path(__file__).resolve().parents[4] / "shared" / "data" / "stereo_chessboard"

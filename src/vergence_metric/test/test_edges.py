@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.edges import ImageShapeError, detect_edges, to_grey
+from vergence_metric.edges.edges import ImageShapeError, detect_edges, to_grey
+from vergence_metric.edges.parameters import EdgeMetricParameters
 from vergence_rig.parameters import ParameterError
 
 AUTO = EdgeMetricParameters()

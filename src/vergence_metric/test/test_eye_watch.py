@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from vergence_metric.eye_watch import EyeWatch
-from vergence_metric.fovea_parameters import TrackerParameters
+from vergence_metric.disparity.parameters import TrackerParameters
+from vergence_metric.tracking.saccade_detector import EyeWatch
 from vergence_rig.geometry import EyeAngles
 
 FRAME_S = 1 / 30

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric.joint_history import JointHistory
+from vergence_metric.pairs.joint_history import JointHistory
 from vergence_rig.geometry import EyeAngles
 
 NAMES = ("tilt", "pan_left", "pan_right")

@@ -6,7 +6,7 @@ from queue import SimpleQueue
 
 import pytest
 
-from vergence_metric.latest_worker import LatestWorker
+from vergence_metric.pairs.latest_worker import LatestWorker
 
 
 class Work:

@@ -3,9 +3,9 @@ import numpy as np
 import pytest
 
 from vergence_metric.disparity import Disparity, DisparityStatus
-from vergence_metric.edge_metric import EdgeMetric
-from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.overlay import BOTH_BGR, LEFT_BGR, RIGHT_BGR, draw_overlay, overlay_lines
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.measurement.edge_metric import EdgeMetric
+from vergence_metric.measurement.overlay import BOTH_BGR, LEFT_BGR, RIGHT_BGR, draw_overlay, overlay_lines
 
 GOOD = Disparity(12.0, 0.0, 0.1, 0.97, DisparityStatus.OK, "", "zncc", (159.5, 119.5))
 NONE = Disparity.none(DisparityStatus.NO_TEXTURE, "blank", "zncc", (159.5, 119.5))

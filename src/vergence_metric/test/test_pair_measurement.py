@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence_metric.edge_metric import EdgeMetricResult
-from vergence_metric.edge_node_parameters import EdgeMetricNodeParameters
-from vergence_metric.pair_measurement import PairMeasurement
-from vergence_metric.track import Track, TrackStatus
+from vergence_metric.measurement.edge_metric import EdgeMetricResult
+from vergence_metric.measurement.pair_measurement import PairMeasurement
+from vergence_metric.measurement.parameters import EdgeMetricNodeParameters
+from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import default_rig
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric import frame_interval
-from vergence_metric.frame_interval import WINDOW, FrameInterval
-from vergence_metric.pairing import JUMP_NS, LEFT, RIGHT, Pair, StereoPairer
-from vergence_metric.pairing_parameters import PairingParameters
+from vergence_metric.pairs import frame_interval
+from vergence_metric.pairs.frame_interval import WINDOW, FrameInterval
+from vergence_metric.pairs.pairing import JUMP_NS, LEFT, RIGHT, Pair, StereoPairer
+from vergence_metric.pairs.parameters import PairingParameters
 
 MS = 1_000_000
 PERIOD_NS = 33_333_333

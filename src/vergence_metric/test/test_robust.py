@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vergence_metric.edge_metric import EdgeMetric
-from vergence_metric.edge_parameters import EdgeMetricParameters
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.measurement.edge_metric import EdgeMetric
 
 Grey = NDArray[np.uint8]
 

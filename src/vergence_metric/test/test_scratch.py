@@ -1,9 +1,9 @@
 import cv2
 import numpy as np
 
-from vergence_metric.edge_metric import EdgeMetric
-from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.scratch import Scratch
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.scratch import Scratch
+from vergence_metric.measurement.edge_metric import EdgeMetric
 
 
 def test_a_name_keeps_its_memory_and_grows_when_it_must() -> None:

@@ -1,6 +1,6 @@
 import pytest
 
-from vergence_metric.stage_times import StageTimes
+from vergence_metric.pairs.stage_times import StageTimes
 
 
 def test_median_and_99th_percentile_of_the_latest_times_in_order_of_appearance() -> None:

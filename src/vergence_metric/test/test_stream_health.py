@@ -1,6 +1,6 @@
 import pytest
 
-from vergence_metric.stream_health import StreamHealth
+from vergence_metric.pairs.stream_health import StreamHealth
 
 
 def thirty_hz(seconds: float = 2.0) -> StreamHealth:

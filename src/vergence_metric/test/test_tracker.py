@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from vergence_metric.disparity import make_estimator
-from vergence_metric.fovea_parameters import DisparityParameters, TrackerParameters
-from vergence_metric.track import TrackStatus
-from vergence_metric.tracker import TargetTracker
+from vergence_metric.disparity.parameters import DisparityParameters, TrackerParameters
+from vergence_metric.tracking.track import TrackStatus
+from vergence_metric.tracking.tracker import TargetTracker
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, eye_position, gaze_for_point, rotation_rig_from_optical
 from vergence_rig.rig import default_rig

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric.edge_parameters import EdgeMetricParameters
-from vergence_metric.verged import VergedJudge
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.measurement.verged import VergedJudge
 from vergence_rig.parameters import ParameterError
 
 P = EdgeMetricParameters(verged_contrast=0.6, verged_leave_contrast=0.72, verged_px=2.0, verged_leave_px=4.0)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from vergence_metric.eye_rotation.encoder import EyeRotationReading, EyeRotationStatus, VisualEncoder
 from vergence_metric.eye_rotation.epipolar_view import epipolar_view
-from vergence_metric.eye_rotation_parameters import EncoderParameters
+from vergence_metric.eye_rotation.parameters import EncoderParameters
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, rotation_rig_from_eye
 from vergence_rig.rig import default_rig

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric.windows import WindowError, centre_window, centre_windows
+from vergence_metric.edges.windows import WindowError, centre_window, centre_windows
 
 
 def test_windows_start_where_the_paper_s_flowchart_says() -> None:

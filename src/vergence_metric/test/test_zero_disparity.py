@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence_metric.zero_disparity import zero_disparity
+from vergence_metric.tracking.zero_disparity import zero_disparity
 
 
 def texture(seed):

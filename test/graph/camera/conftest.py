@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import CameraInfo
 
-from vergence_camera.camera_node import CameraNode
-from vergence_camera.fake_machine import FakeMachine
-from vergence_camera.v4l2.fake_camera import FakeCamera
+from vergence_camera.ros.camera_node import CameraNode
+from vergence_camera.testing.fake_camera import FakeCamera
+from vergence_camera.testing.fake_machine import FakeMachine
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_nanoseconds
 

@@ -8,8 +8,8 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.srv import DescribeParameters
 
-from vergence_camera.camera_node import CameraNode
-from vergence_camera.fake_machine import FakeMachine
+from vergence_camera.ros.camera_node import CameraNode
+from vergence_camera.testing.fake_machine import FakeMachine
 from vergence_camera.v4l2 import structures as v4l2
 
 pytestmark = pytest.mark.graph

@@ -10,8 +10,8 @@ from sensor_msgs.msg import CameraInfo
 from sensor_msgs.srv import SetCameraInfo
 
 from vergence_camera.camera_info import Calibration, load_calibration, save_calibration
-from vergence_camera.camera_node import CameraNode
-from vergence_camera.fake_machine import FakeMachine
+from vergence_camera.ros.camera_node import CameraNode
+from vergence_camera.testing.fake_machine import FakeMachine
 
 pytestmark = pytest.mark.graph
 

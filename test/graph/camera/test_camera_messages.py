@@ -5,7 +5,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
-from vergence_camera.camera_messages import JpegSerializer
+from vergence_camera.ros.camera_messages import JpegSerializer
 from vergence_common.stamps import from_nanoseconds
 
 pytestmark = pytest.mark.graph

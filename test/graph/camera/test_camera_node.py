@@ -13,9 +13,9 @@ from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CompressedImage, Image
 
-from vergence_camera.camera_node import CameraNode
 from vergence_camera.errors import ControlError, FileMissingError, ModeMismatchError
-from vergence_camera.fake_machine import FakeMachine
+from vergence_camera.ros.camera_node import CameraNode
+from vergence_camera.testing.fake_machine import FakeMachine
 from vergence_common.images import image_to_array
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_rig.parameters import ParameterError

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.box_parameters import BoxMetricParameters
 from vergence_metric.boxes.appearance import likeness, signature
 from vergence_metric.boxes.detections import Box
 from vergence_metric.boxes.pair_geometry import PairGeometry, Pixel
+from vergence_metric.boxes.parameters import BoxMetricParameters
 
 _SIZE_SIGMA = 0.12
 _SIZE_FLOOR_PX = 2.0

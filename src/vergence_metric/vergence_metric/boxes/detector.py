@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.box_parameters import DetectorParameters
 from vergence_metric.boxes.decoding import Raw, decode
 from vergence_metric.boxes.detections import Detections, make_detections
 from vergence_metric.boxes.errors import DetectorError, DetectorImageError, ModelClassError
 from vergence_metric.boxes.layouts import find_layout
 from vergence_metric.boxes.letterbox import Letterbox, blob
+from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.boxes.second_look import CROP_PX, look_again
 from vergence_metric.boxes.session import ModelSession
 from vergence_metric.boxes.suppression import suppress

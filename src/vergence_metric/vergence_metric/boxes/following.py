@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vergence_metric.box_parameters import BoxMetricParameters
 from vergence_metric.boxes.association import Association, BoxPair, Expected
 from vergence_metric.boxes.detections import Box
 from vergence_metric.boxes.pair_geometry import PairGeometry, Pixel
+from vergence_metric.boxes.parameters import BoxMetricParameters
 
 _OFF_CENTER_COST = 0.3  # of score, from the image's middle to its border
 

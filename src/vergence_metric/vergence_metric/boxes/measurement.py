@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.box_parameters import BoxMetricNodeParameters
 from vergence_metric.boxes.association import BoxPair, associate
 from vergence_metric.boxes.corner_metric import corner_metric, hidden_sides
 from vergence_metric.boxes.detections import Box, Detections
@@ -17,12 +16,13 @@ from vergence_metric.boxes.detector import Detector
 from vergence_metric.boxes.errors import DetectorImageError
 from vergence_metric.boxes.following import Choice, TargetMemory
 from vergence_metric.boxes.pair_geometry import PairGeometry
+from vergence_metric.boxes.parameters import BoxMetricNodeParameters
 from vergence_metric.boxes.refinement import refine
 from vergence_metric.boxes.result import NAN2, UNREFINED, BoxStatus, BoxVergenceResult
 from vergence_metric.boxes.smoothing import LagLimitedFilter
 from vergence_metric.boxes.target_point import TargetPoint, locate
 from vergence_metric.boxes.uncertainty import direction_sigma_px, disparity_sigma_px
-from vergence_metric.viewing_angles import angular_disparity
+from vergence_metric.pairs.viewing_angles import angular_disparity
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 

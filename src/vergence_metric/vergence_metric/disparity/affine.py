@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from vergence_metric.disparity.correlation import radius_of
 from vergence_metric.disparity.fovea_pair import FoveaPair, Strip
 from vergence_metric.disparity.measured import Measured
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _BLUR_PX = 0.9  # linear interpolation is all but exact on what this leaves
 _REMAP_STEPS = 32  # per pixel

@@ -12,8 +12,8 @@ import numpy as np
 from vergence_metric.disparity.correlation import parabola
 from vergence_metric.disparity.fovea_pair import FoveaPair
 from vergence_metric.disparity.measured import Measured, measuring_window_px, side_of, tapered, window_about
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _REACH_PX = 6
 _SMALLEST_POWER = 1e-3  # share of the mean power added before the logarithm: noise has no echo

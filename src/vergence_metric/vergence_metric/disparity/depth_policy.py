@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.disparity.fovea_pair import cut
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image, Point
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _HALF_SIDE_PX = 100
 _BIN_PX = 2.0

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from vergence_metric.disparity.fovea_pair import FoveaPair, Grey, Strip
 from vergence_metric.disparity.measured import Measured, measuring_window_px
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _TRUNCATION_PX = 4.0
 _BLUR_PX = 1.2

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from vergence_metric.disparity.fovea_pair import FoveaPair
 from vergence_metric.disparity.measured import Measured, side_of, window_about
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _WAVELENGTHS_PX = (24.0, 16.0, 11.0, 8.0, 8.0)
 _ORIENTATIONS_RAD = tuple(math.radians(a) for a in (0.0, 30.0, 60.0, 90.0, 120.0, 150.0))

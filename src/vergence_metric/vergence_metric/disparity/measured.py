@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from vergence_metric.disparity.correlation import radius_of
 from vergence_metric.disparity.fovea_pair import FoveaPair, Grey, Strip
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image, Point
 from vergence_metric.disparity.search import Match, find, pair_about
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _DISAGREEMENT_PX = 2.0
 

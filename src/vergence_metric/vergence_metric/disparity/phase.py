@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from vergence_metric.disparity.fovea_pair import FoveaPair
 from vergence_metric.disparity.measured import Measured, measuring_window_px, side_of, tapered, window_about
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _ROUNDS = 3
 _BAND = 0.25  # cycles per pixel; above, aliasing and noise

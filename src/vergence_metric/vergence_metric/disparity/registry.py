@@ -6,10 +6,10 @@ from vergence_metric.disparity.depth_policy import DepthPolicyEstimator
 from vergence_metric.disparity.edge_shift import measure_edge_shift
 from vergence_metric.disparity.gabor import measure_gabor
 from vergence_metric.disparity.measured import Measure, MeasuredEstimator
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.phase import measure_phase
 from vergence_metric.disparity.protocol import DisparityEstimator
 from vergence_metric.disparity.zncc import measure_zncc
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _MEASURES: dict[str, Measure] = {
     "affine": measure_affine,

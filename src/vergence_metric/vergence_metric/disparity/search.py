@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from vergence_metric.disparity.correlation import Surface, correlate, radius_of, texture_about
 from vergence_metric.disparity.evidence import Evidence
 from vergence_metric.disparity.fovea_pair import FoveaPair, Strip
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.protocol import DisparityStatus, Image
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _VICINITY_PX = 24
 _HALVED_FROM_PX = 8.0  # windows of this deviation or more are searched wide at half resolution

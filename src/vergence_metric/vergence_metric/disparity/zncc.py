@@ -3,8 +3,8 @@
 from vergence_metric.disparity.correlation import correlate
 from vergence_metric.disparity.fovea_pair import FoveaPair
 from vergence_metric.disparity.measured import Measured, measuring_window_px
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match, deviation_px
-from vergence_metric.fovea_parameters import DisparityParameters
 
 _REACH_PX = 3
 

@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from vergence_metric.eye_rotation.epipolar_view import epipolar_view
 from vergence_metric.eye_rotation.matching import MatchingSettings, matches
+from vergence_metric.eye_rotation.parameters import EncoderParameters
 from vergence_metric.eye_rotation.relative_rotation import (
     MINIMUM_MATCHES,
     RelativeRotation,
     RigDoubt,
     relative_rotation,
 )
-from vergence_metric.eye_rotation_parameters import EncoderParameters
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import Rig

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from vergence_metric.eye_rotation_parameters import EncoderParameters
-from vergence_metric.image_motion import image_motion_px
-from vergence_metric.joint_history import JointHistory
+from vergence_metric.eye_rotation.parameters import EncoderParameters
+from vergence_metric.pairs.image_motion import image_motion_px
+from vergence_metric.pairs.joint_history import JointHistory
 
 Pixels = npt.NDArray[np.uint8]
 

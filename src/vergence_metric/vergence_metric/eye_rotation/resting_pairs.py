@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from vergence_metric.eye_rotation.encoder import EyeRotationReading, EyeRotationStatus, VisualEncoder, not_measured
 from vergence_metric.eye_rotation.rest import joints_moved, view_moved
-from vergence_metric.joint_history import JointHistory
-from vergence_metric.pairing import Pair
+from vergence_metric.pairs.joint_history import JointHistory
+from vergence_metric.pairs.pairing import Pair
 from vergence_rig.camera import CameraModel
 
 

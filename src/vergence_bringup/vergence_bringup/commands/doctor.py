@@ -1,0 +1,174 @@
+"""`vergence doctor`: what is missing on this machine, and how to mend it."""
+
+import argparse
+import ctypes.util
+import grp
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from vergence_bringup.ros.processes import ProcessError, config_dir, find_executable
+from vergence_rig.finding import Finding
+
+_SHM_WANTED_MB = 64  # two cameras, three readers and slack, in segments of 16 MiB
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the subcommand."""
+    parser.add_argument("--no-render", action="store_true", help="skip the trial rendering (it takes two seconds)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print every finding; 0 if nothing that is needed is missing."""
+    findings = list(examine(render=not options.no_render))
+    for finding in findings:
+        mark = "ok  " if finding.ok else ("FAIL" if finding.needed else "note")
+        print(f"{mark}  {finding.name}: {finding.message}")
+        if not finding.ok and finding.mend:
+            print(f"      -> {finding.mend}")
+    missing = sum(not finding.ok and finding.needed for finding in findings)
+    print(f"\n{missing} thing{'s' * (missing != 1)} to mend" if missing else "\nnothing that is needed is missing")
+    return 1 if missing else 0
+
+
+def examine(render: bool = True) -> Iterable[Finding]:
+    """Yield a finding for everything the nodes, the demo or a build rely on."""
+    yield from _guarded("python", _python)
+    yield from _guarded("compiler", _compiler)
+    yield from _guarded("ros", _ros)
+    yield from _guarded("nodes", _nodes)
+    yield from _guarded("middleware", _middleware)
+    yield from _guarded("shared memory", _shared_memory)
+    yield from _guarded("rendering", lambda: _rendering(render))
+    yield from _guarded("groups", _groups)
+    yield from _guarded("cameras", _cameras)
+
+
+def _guarded(name: str, look: Callable[[], Iterable[Finding]]) -> Iterable[Finding]:
+    try:
+        yield from look()
+    except Exception as error:  # the doctor must not fall ill himself
+        yield Finding(name, False, f"could not be examined: {type(error).__name__}: {error}", needed=False)
+
+
+def _python() -> Iterable[Finding]:
+    version = ".".join(map(str, sys.version_info[:3]))
+    good = (3, 10) <= sys.version_info[:2] <= (3, 14)
+    yield Finding("python", good, f"{version} at {sys.executable}", "use Python 3.10 to 3.14: make setup PYTHON=...")
+    wanted = {"numpy": "numpy", "cv2": "opencv-python-headless", "yaml": "PyYAML", "onnxruntime": "onnxruntime"}
+    absent = [package for module, package in wanted.items() if importlib.util.find_spec(module) is None]
+    found = "all there" if not absent else "missing: " + ", ".join(absent)
+    yield Finding("python packages", not absent, found, f"pip install {' '.join(absent)}, or make setup")
+
+
+def _compiler() -> Iterable[Finding]:
+    absent = [tool for tool in ("gcc", "g++", "make") if shutil.which(tool) is None]
+    message = "gcc, g++ and make are there" if not absent else "missing: " + ", ".join(absent)
+    yield Finding("compiler", not absent, message, "apt install build-essential (the messages are compiled)")
+    header = Path(sysconfig.get_paths()["include"]) / "Python.h"
+    yield Finding("python headers", header.exists(), str(header), "apt install python3-dev")
+
+
+def _ros() -> Iterable[Finding]:
+    where = "apt, /opt/ros/jazzy" if Path("/opt/ros/jazzy").exists() else "wheels in this environment"
+    there = importlib.util.find_spec("rclpy") is not None
+    yield Finding("rclpy", there, where if there else "cannot be imported", "make setup, then source env.sh")
+    distro = os.environ.get("ROS_DISTRO", "jazzy")
+    yield Finding("ROS distribution", distro == "jazzy", distro, "this workspace is written for Jazzy")
+
+
+def _nodes() -> Iterable[Finding]:
+    nodes = (
+        ("vergence_camera", "camera_node"),
+        ("vergence_metric", "edge_metric_node"),
+        ("vergence_metric", "box_metric_node"),
+        ("vergence_gaze", "gaze_controller_node"),
+        ("vergence_servo", "servo_node"),
+        ("vergence_sim", "sim_node"),
+    )
+    absent = []
+    for package, executable in nodes:
+        try:
+            find_executable(package, executable)
+        except ProcessError as error:
+            absent.append(str(error))
+    message = f"{len(nodes) - len(absent)} of {len(nodes)} built" + "".join(f"; {text}" for text in absent)
+    yield Finding("nodes", not absent, message, "make setup, then source env.sh")
+
+
+def _middleware() -> Iterable[Finding]:
+    profile = os.environ.get("FASTRTPS_DEFAULT_PROFILES_FILE")
+    shipped = config_dir() / "fastdds.xml"
+    mend = f"source env.sh, or export FASTRTPS_DEFAULT_PROFILES_FILE={shipped}"
+    if os.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp") != "rmw_fastrtps_cpp":
+        name = os.environ["RMW_IMPLEMENTATION"]
+        yield Finding("DDS", True, f"{name}: the shipped Fast DDS profile is not used", needed=False)
+    elif profile is None:
+        message = "profile not set: raw image pairs would be lost or late"
+        yield Finding("DDS profile", False, message, mend)
+    elif not Path(profile).is_file():
+        yield Finding("DDS profile", False, f"{profile} is not there", mend)
+    else:
+        yield Finding("DDS profile", True, profile)
+    reach = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET (ROS's own default)")
+    domain = os.environ.get("ROS_DOMAIN_ID", "0")
+    yield Finding("DDS discovery", True, f"range {reach}, domain {domain}", needed=False)
+
+
+def _shared_memory() -> Iterable[Finding]:
+    usage = shutil.disk_usage("/dev/shm")
+    free_mb = usage.free / 2**20
+    message = f"/dev/shm has {free_mb:.0f} of {usage.total / 2**20:.0f} MiB free, {_SHM_WANTED_MB} are wanted"
+    mend = "mount -o remount,size=512M /dev/shm (in a container: --shm-size=512m)"
+    yield Finding("shared memory", free_mb >= _SHM_WANTED_MB, message, mend)
+
+
+def _rendering(trial: bool) -> Iterable[Finding]:
+    if importlib.util.find_spec("mujoco") is None:
+        yield Finding("simulator", False, "mujoco is not installed", "pip install mujoco (only sim_node needs it)")
+        return
+    library = ctypes.util.find_library("EGL")
+    mend = "apt install libegl1 libgl1-mesa-dri (only sim_node needs it)"
+    yield Finding("libEGL", library is not None, library or "not found", mend)
+    if not trial or library is None:
+        return
+    code = "import mujoco; c = mujoco.GLContext(8, 8); c.make_current(); print(mujoco.__version__)"
+    env = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL", "egl")}
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, timeout=60)
+    lines = (result.stdout if result.returncode == 0 else result.stderr).strip().splitlines() or ["no output"]
+    message = f"MuJoCo {lines[-1]} renders with MUJOCO_GL={env['MUJOCO_GL']}" if not result.returncode else lines[-1]
+    yield Finding("rendering", result.returncode == 0, message, mend)
+
+
+def _groups() -> Iterable[Finding]:
+    mine = {grp.getgrgid(number).gr_name for number in os.getgroups() if _has_name(number)}
+    purposes = {"video": "cameras", "gpio": "servos on GPIO", "i2c": "servos on a PCA9685"}
+    for group, purpose in purposes.items():
+        if group not in {entry.gr_name for entry in grp.getgrall()}:
+            continue
+        member = os.geteuid() == 0 or group in mine
+        message = f"{purpose}: this user is {'' if member else 'not '}allowed"
+        yield Finding(
+            f"group {group}", member, message, f"sudo usermod -aG {group} $USER, then log in anew", needed=False
+        )
+
+
+def _has_name(group_id: int) -> bool:
+    try:
+        grp.getgrgid(group_id)
+    except KeyError:
+        return False
+    return True
+
+
+def _cameras() -> Iterable[Finding]:
+    doctor: Any = importlib.import_module("vergence_camera.doctor")
+    for finding in doctor.check():
+        yield replace(finding, needed=False)  # recordings and the simulator do without

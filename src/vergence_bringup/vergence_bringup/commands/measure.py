@@ -1,0 +1,110 @@
+"""`vergence measure`: the paper's flowchart on two stored images, and the boxes of a detector."""
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from vergence_bringup.figures.boxes import BoxFigures, corner_text, signed
+from vergence_bringup.figures.pictures import Image, combined_edges, read_image, write_image
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.measurement.edge_metric import EdgeMetric
+
+SHIPPED = "shipped"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the subcommand."""
+    parser.add_argument("left", type=Path, metavar="LEFT", help="the left eye's image")
+    parser.add_argument("right", type=Path, metavar="RIGHT", help="the right eye's image, of the same size")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="write left_edges.png, right_edges.png, combined_edges.png and, with --model, boxes.png",
+    )
+    parser.add_argument(
+        "--model",
+        metavar="FILE",
+        help=f"add metric II with this ONNX detector; {SHIPPED!r} is the one for Rubik's cubes that comes with it",
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON object on standard output instead of the table")
+    parser.add_argument("--windows", type=int, nargs="+", metavar="PX", help="sides of the centre windows in px")
+    parser.add_argument(
+        "--align",
+        choices=("none", "auto"),
+        default="none",
+        help="none: exactly the paper; auto: take vertical offset and roll out of the right image first",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure one pair, print it and write its pictures."""
+    parameters = EdgeMetricParameters().replaced(align=options.align)
+    if options.windows:
+        parameters = parameters.replaced(windows_px=tuple(options.windows))
+    left, right = read_image(options.left), read_image(options.right)
+    result = EdgeMetric(parameters).measure(left, right)
+    if options.out is not None:
+        write_image(options.out / "left_edges.png", result.left_edges.mask)
+        write_image(options.out / "right_edges.png", result.right_edges.mask)
+        write_image(options.out / "combined_edges.png", combined_edges(result.left_edges.mask, result.right_edges.mask))
+    # Before anything is printed: a model that cannot be used is one line, not one below a table.
+    boxes = _boxes(left, right, options.model, options.out) if options.model is not None else None
+    figures = {
+        "windows_px": [int(size) for size in result.windows_px],
+        "left_to_right_px": _numbers(result.left_to_right_px),
+        "right_to_left_px": _numbers(result.right_to_left_px),
+        "contrast": _numbers(result.contrast),
+    }
+    if options.json:
+        json.dump(figures if boxes is None else {**figures, "box": boxes.as_json()}, sys.stdout, allow_nan=False)
+        print()
+        return 0
+    print(f"{'window':>9}  {'left to right':>13}  {'right to left':>13}  {'contrast':>8}")
+    for size, left_to_right, right_to_left, contrast in zip(*figures.values(), strict=True):
+        row = (_text(left_to_right, " px"), _text(right_to_left, " px"), _text(contrast, ""))
+        print(f"{f'{size}x{size}':>9}  {row[0]:>13}  {row[1]:>13}  {row[2]:>8}")
+    if boxes is not None:
+        _print_boxes(boxes)
+    if options.out is not None:
+        print(f"pictures: {options.out}")
+    return 0
+
+
+def _boxes(left: Image, right: Image, model: str, out: Path | None) -> BoxFigures:
+    # Imported late: onnxruntime is needed for this alone.
+    from vergence_metric.boxes import draw, measure_pair
+
+    if not model:
+        raise ValueError(f"--model is empty: allowed is the path of an ONNX file, or {SHIPPED}")
+    result = measure_pair(left, right, "" if model == SHIPPED else model)
+    if out is not None:
+        write_image(out / "boxes.png", draw(left, right, result))
+    return BoxFigures.from_result(result)
+
+
+def _print_boxes(boxes: BoxFigures) -> None:
+    reason = f" ({boxes.reason})" if boxes.reason else ""
+    print(f"\nboxes: {boxes.seen}{reason}, scores {_score(boxes.scores[0])} left, {_score(boxes.scores[1])} right")
+    if not any(math.isfinite(value) for value in boxes.left_minus_right_px):
+        return
+    print(f"{'corners':>9}  {'top left, bottom right, in px':>34}")
+    print(f"{'L - R':>9}  {corner_text(boxes.left_minus_right_px):>34}")
+    print(f"{'R - L':>9}  {corner_text(boxes.right_minus_left_px):>34}")
+    center, refined = signed(boxes.center_px[0]), signed(boxes.refined_px[0])
+    print(f"disparity of the boxes' centres {center} px, of the surface inside them {refined} px")
+
+
+def _score(value: float) -> str:
+    return f"{value:.2f}" if math.isfinite(value) else "-"
+
+
+def _numbers(values: Iterable[float]) -> list[float | None]:
+    return [float(value) if math.isfinite(value) else None for value in values]
+
+
+def _text(value: float | None, unit: str) -> str:
+    return "no edges" if value is None else f"{value:.2f}{unit}"

@@ -1,0 +1,1 @@
+"""The demo: stations, result and report."""

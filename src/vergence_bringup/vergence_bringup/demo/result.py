@@ -1,0 +1,202 @@
+"""What the demo measured at each station, its verdict, and how it is printed and stored. No ROS in it."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_bringup.demo.stations import Station
+from vergence_bringup.figures.boxes import BoxFigures, corner_text, signed
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MetricTable:
+    """Metric I of one pair; every array has one element a window. NaN where a window holds no edges."""
+
+    windows_px: Sequence[int]
+    left_to_right_px: Sequence[float]
+    right_to_left_px: Sequence[float]
+    contrast: Sequence[float]
+
+
+def _empty() -> Floats:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True)
+class Series:
+    """What happened over time; `time_s` counts from the goal."""
+
+    time_s: Floats = field(default_factory=_empty)
+    metric_px: Floats = field(default_factory=_empty)  # mean of both directions in the 100 px window, or the smallest
+    contrast: Floats = field(default_factory=_empty)
+    state_time_s: Floats = field(default_factory=_empty)
+    vergence_deg: Floats = field(default_factory=_empty)  # what the controller believes
+    truth_time_s: Floats = field(default_factory=_empty)
+    true_vergence_deg: Floats = field(default_factory=_empty)
+    wanted_vergence_deg: Floats = field(default_factory=_empty)  # the vergence angle that fixates the target point
+    true_disparity_px: Floats = field(default_factory=_empty)  # mean over what both eyes see of the target
+    box_time_s: Floats = field(default_factory=_empty)
+    box_center_px: Floats = field(default_factory=_empty)
+    box_refined_px: Floats = field(default_factory=_empty)
+
+
+@dataclass(frozen=True)
+class StationResult:
+    """One station's outcome.
+
+    `verged`: the graph said so and went on saying so. `true_error_deg`: median of the true vergence error's magnitude
+    while it was held. `off_axis_deg`: how far the eye that looks past the target point most looks past it (median).
+    `tolerance_deg`: what the true error may be for the truth to agree.
+    """
+
+    name: str
+    title: str
+    moving: bool
+    said_verged: bool
+    reason: str
+    time_s: float
+    true_error_deg: float
+    off_axis_deg: float
+    tolerance_deg: float
+    off_axis_tolerance_deg: float
+    start: MetricTable
+    end: MetricTable
+    fixation_m: tuple[float, float, float]
+    target_m: tuple[float, float, float]
+    series: Series
+    start_box: BoxFigures | None = None
+    end_box: BoxFigures | None = None
+
+    @property
+    def truth_agrees(self) -> bool:
+        """True if the simulator's truth agrees that both eyes are on the target."""
+        # NaN compares false: a truth that is not known agrees with nothing.
+        return self.true_error_deg <= self.tolerance_deg and self.off_axis_deg <= self.off_axis_tolerance_deg
+
+    @property
+    def passed(self) -> bool:
+        """True if the graph said verged and the truth agrees."""
+        return self.said_verged and self.truth_agrees
+
+
+_NO_TABLE = MetricTable((), (), (), ())
+_NOWHERE = (math.nan, math.nan, math.nan)
+
+
+def unfinished(station: Station, reason: str) -> StationResult:
+    """Return the result of a station that came to nothing."""
+    return StationResult(
+        name=station.name,
+        title=station.title,
+        moving=station.moving,
+        said_verged=False,
+        reason=reason,
+        time_s=math.nan,
+        true_error_deg=math.nan,
+        off_axis_deg=math.nan,
+        tolerance_deg=math.nan,
+        off_axis_tolerance_deg=math.nan,
+        start=_NO_TABLE,
+        end=_NO_TABLE,
+        fixation_m=_NOWHERE,
+        target_m=_NOWHERE,
+        series=Series(),
+    )
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _numbers(values: Sequence[float]) -> list[float | None]:
+    return [_number(value) for value in values]
+
+
+def summary(results: Sequence[StationResult], settings: dict[str, Any]) -> dict[str, Any]:
+    """Return what goes into summary.json; figures that are not known are null."""
+    return {
+        "passed": bool(results) and all(result.passed for result in results),
+        **settings,
+        "stations": [
+            {
+                "name": result.name,
+                "title": result.title,
+                "verged": result.said_verged,
+                "truth_agrees": result.truth_agrees,
+                "reason": result.reason,
+                "time_s": _number(result.time_s),
+                "true_error_deg": _number(result.true_error_deg),
+                "tolerance_deg": _number(result.tolerance_deg),
+                "off_axis_deg": _number(result.off_axis_deg),
+                "windows_px": list(result.start.windows_px),
+                "left_to_right_px": {
+                    "start": _numbers(result.start.left_to_right_px),
+                    "end": _numbers(result.end.left_to_right_px),
+                },
+                "right_to_left_px": {
+                    "start": _numbers(result.start.right_to_left_px),
+                    "end": _numbers(result.end.right_to_left_px),
+                },
+                "contrast": {"start": _numbers(result.start.contrast), "end": _numbers(result.end.contrast)},
+                "box": {
+                    "start": result.start_box and result.start_box.as_json(),
+                    "end": result.end_box and result.end_box.as_json(),
+                },
+                "fixation_point_m": _numbers(result.fixation_m),
+                "target_point_m": _numbers(result.target_m),
+            }
+            for result in results
+        ],
+    }
+
+
+def write_summary(path: Path, results: Sequence[StationResult], settings: dict[str, Any]) -> None:
+    """Write summary.json."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(summary(results, settings), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _figure(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
+
+
+def table(results: Sequence[StationResult]) -> str:
+    """Return the table for the terminal: the verdicts, metric I at start and end for every window, and metric II."""
+    lines = [f"{'station':16} {'graph':10} {'truth':9} {'time':>6} {'true error':>11} {'off axis':>9}   metric in px"]
+    for result in results:
+        said = "verged" if result.said_verged else "NOT VERGED"
+        truth = "agrees" if result.truth_agrees else "DISAGREES"
+        lines.append(
+            f"{result.name:16} {said:10} {truth:9} {_figure(result.time_s, 2):>5}s"
+            f" {_figure(result.true_error_deg, 2):>7} deg {_figure(result.off_axis_deg, 2):>5} deg"
+            f"   window {' '.join(f'{size:>6}' for size in result.start.windows_px)}"
+        )
+        for label, metric in (("start", result.start), ("end", result.end)):
+            for arrow, values in (("L to R", metric.left_to_right_px), ("R to L", metric.right_to_left_px)):
+                figures = " ".join(f"{_figure(value, 2):>6}" for value in values)
+                lines.append(f"{'':71}{label:>5} {arrow} {figures}".rstrip())
+        for label, box in (("start", result.start_box), ("end", result.end_box)):
+            if box is not None:
+                lines.append(f"{'':17}boxes {label:>5} {_box_text(box)}")
+        if result.reason:
+            lines.append(f"{'':16} {result.reason}")
+    return "\n".join(lines)
+
+
+def _box_text(box: BoxFigures) -> str:
+    scores = "/".join(_figure(score, 2) for score in box.scores)
+    if not any(math.isfinite(value) for value in box.left_minus_right_px):
+        return f"{box.seen} {scores}"
+    return (
+        f"{box.seen} {scores}  L-R {corner_text(box.left_minus_right_px)}"
+        f"  R-L {corner_text(box.right_minus_left_px)}  centre {signed(box.center_px[0])}"
+        f"  surface {signed(box.refined_px[0])}"
+    )

@@ -1,0 +1,136 @@
+"""`vergence demo`: every node as its own process, the simulated head, and a report of what it did."""
+
+import argparse
+import contextlib
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FrameType
+
+import yaml
+
+from vergence_bringup.demo.report import write_report
+from vergence_bringup.demo.result import StationResult, table, write_summary
+from vergence_bringup.demo.stations import Station, stations
+from vergence_bringup.demo.visits import Runner, visit_all
+from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir, environment
+from vergence_common.domains import own_domain
+from vergence_rig.rig import Rig, load_rig
+
+# The simulator, its ground truth and the demo's recorder share two cores with the nodes: what they cannot keep up with
+# comes late, and late images are worth less than fewer.
+FRAME_RATE_HZ = 20.0
+BOX_RATE_HZ = 8.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of the subcommand."""
+    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="where the report goes (default: out/demo)")
+    parser.add_argument("--short", action="store_true", help="three stations instead of eight")
+    parser.add_argument("--ideal", action="store_true", help="ideal servos and cameras instead of realistic ones")
+    parser.add_argument("--station", action="append", metavar="NAME", help="only this station (may be repeated)")
+    parser.add_argument("--seed", type=int, default=0, help="of the simulator's noise and world (default: 0)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the demo; 0 only if at every station the graph said verged and the simulator's truth agrees."""
+    rig = load_rig(config_dir() / "rig.yaml")
+    chosen = stations(rig.baseline_m, options.short)
+    if options.station:
+        known = {station.name: station for station in stations(rig.baseline_m)}
+        for name in options.station:
+            if name not in known:
+                raise ValueError(f"--station is {name!r}: allowed is one of {', '.join(known)}")
+        chosen = [known[name] for name in options.station]
+
+    signal.signal(signal.SIGTERM, _interrupt)
+    os.environ.update(environment())
+    with contextlib.ExitStack() as stack:
+        if "ROS_DOMAIN_ID" not in os.environ:
+            # Another head on this machine must not be heard here, nor hear this one.
+            os.environ["ROS_DOMAIN_ID"] = str(stack.enter_context(own_domain()))
+            _say(f"to look on from another shell: source env.sh; export ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
+        return _run(options, rig, chosen)
+
+
+def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station]) -> int:
+    started = time.monotonic()
+    results: list[StationResult] = []
+    commands = _commands(options)
+    _say(f"starting {', '.join(commands)} (logs in {options.out / 'log'})")
+    with ProcessGroup(log_dir=options.out / "log") as processes:
+        for name, command in commands.items():
+            processes.start(name, command)
+        with _runner(options, rig, processes.check) as runner:
+            visit_all(runner, chosen, results, _say)
+        _say("stopping the nodes")
+        statuses = processes.stop()
+    for name, status in statuses.items():
+        if status != 0:
+            _say(f"{name} ended with status {status}: see {options.out / 'log' / name}.log")
+
+    settings = {
+        "servo": "ideal" if options.ideal else "sg90",
+        "cameras": "ideal" if options.ideal else "realistic",
+        "duration_s": round(time.monotonic() - started, 1),
+    }
+    write_summary(options.out / "summary.json", results, settings)
+    write_report(options.out / "report.html", results, settings, options.out)
+    print()
+    print(table(results))
+    passed = sum(result.passed for result in results)
+    print(f"\n{passed} of {len(results)} stations verged, by the graph's word and by the simulator's truth")
+    print(f"report: {options.out / 'report.html'}   figures: {options.out / 'summary.json'}")
+    return 0 if results and passed == len(results) and not any(statuses.values()) else 1
+
+
+@contextlib.contextmanager
+def _runner(options: argparse.Namespace, rig: Rig, alive: Callable[[], None]) -> Iterator[Runner]:
+    # Imported late: rclpy reads the middleware's environment when it is loaded.
+    from vergence_bringup.demo.ros.recorder import Recorder
+    from vergence_bringup.demo.ros.run import StationRunner, tolerance_deg
+
+    recorder = Recorder()
+    try:
+        yield StationRunner(recorder, alive, rig, tolerance_deg(rig, options.ideal), options.out)
+    finally:
+        recorder.close()
+
+
+def head_nodes(rig: Path, **sim: object) -> dict[str, NodeCommand]:
+    """Return the nodes of a simulated head by name, with their shipped YAML; `sim` are parameters of sim_node."""
+    at = {"rig": str(rig)}
+    return {
+        "sim_node": NodeCommand("vergence_sim", "sim_node", at | {"frame_rate_hz": FRAME_RATE_HZ} | sim),
+        "edge_metric_node": NodeCommand("vergence_metric", "edge_metric_node", at),
+        "box_metric_node": NodeCommand("vergence_metric", "box_metric_node", at | {"rate_hz": BOX_RATE_HZ}),
+        "gaze_controller_node": NodeCommand("vergence_gaze", "gaze_controller_node", at),
+    }
+
+
+def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
+    if options.ideal:
+        return head_nodes(_ideal_rig(options.out), seed=options.seed, preset="ideal")
+    return head_nodes(config_dir() / "rig.yaml", seed=options.seed)
+
+
+def _ideal_rig(out_dir: Path) -> Path:
+    """Write the shipped rig with ideal servos, so that the controller does not reckon with play that is not there."""
+    rig = yaml.safe_load((config_dir() / "rig.yaml").read_text(encoding="utf-8"))
+    for joint in rig["joints"].values():
+        joint["servo"] = "ideal"
+    path = out_dir / "rig_ideal.yaml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(rig), encoding="utf-8")
+    return path.resolve()
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _say(text: str) -> None:
+    print(f"\033[1m[demo]\033[0m {text}" if sys.stdout.isatty() else f"[demo] {text}", flush=True)

@@ -1,0 +1,234 @@
+"""One station of the demo: place the target, click on it, watch the eyes, compare with the truth."""
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vergence_bringup.demo.result import Floats, MetricTable, Series, StationResult
+from vergence_bringup.demo.ros.recorder import Recorder, Stamped, StereoPicture
+from vergence_bringup.demo.ros.stage import Stage, of_class
+from vergence_bringup.demo.stations import Station
+from vergence_bringup.figures.boxes import BoxFigures
+from vergence_bringup.figures.pictures import Image, combined_edges, with_box, with_cross, with_windows, write_image
+from vergence_common.stamps import to_seconds
+from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.measurement.edge_metric import EdgeMetric
+from vergence_msgs.action import LookAt
+from vergence_msgs.msg import EdgeVergence
+from vergence_rig.rig import Rig
+
+# The target point must end inside the 50 px fovea of both eyes.
+_FOVEA_HALF_PX = 25.0
+_LIMIT_S = 12.0
+_GO_ALONG_S = 1.0
+
+
+def tolerance_deg(rig: Rig, ideal: bool) -> float:
+    """Return what the true vergence error may be: the servos' dead band, 0.1 degree where they have none."""
+    return 0.1 if ideal else math.degrees(rig.pan_left.servo.dead_band_rad)
+
+
+class StationRunner:
+    """Visits stations one after the other; `alive` raises when a node has died."""
+
+    def __init__(
+        self, recorder: Recorder, alive: Callable[[], None], rig: Rig, tolerance_deg: float, out_dir: Path
+    ) -> None:
+        self._recorder = recorder
+        self._alive = alive
+        self._rig = rig
+        self._tolerance_deg = tolerance_deg
+        self._out_dir = out_dir
+        self._edge_metric = EdgeMetric(EdgeMetricParameters())
+        self._stage = Stage(recorder, alive, ("target", "distractor"))
+
+    def wait_until_ready(self) -> None:
+        """Wait until every node has been heard."""
+        self._stage.wait_until_ready()
+
+    def visit(self, station: Station) -> StationResult:
+        """Show the target, ask the graph to look at it, and return what happened.
+
+        The goal is a click on the left image, as a person would give it, or the target's class.
+        """
+        recorder = self._recorder
+        self._stage.clear()  # until the eyes are at the start
+        recorder.set_parameters("gaze_controller_node", {"mode": "both_eyes"}, self._alive)
+        self._stage.send_eyes(
+            math.radians(station.start_version_deg),
+            math.radians(station.start_vergence_deg),
+            math.radians(station.start_tilt_deg),
+        )
+        recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._alive)
+        recorder.set_parameters("sim_node", {"target": station.target}, self._alive)
+        if station.distractor_m:
+            self._stage.put("distractor", station.distractor_m)
+        self._stage.put("target", station.place_m or self._fixation_m())
+        shown_at = recorder.now_s()
+        truth = recorder.wait_for(
+            f"{station.target} in both views", lambda: self._seen(station, shown_at), 10.0, self._alive
+        )
+        before = recorder.picture(station.has_boxes, self._alive)
+        self._store(station, "start", before)
+
+        began = recorder.now_s()
+        marks = len(recorder.states), len(recorder.edges), len(recorder.truths), len(recorder.boxes)
+        goal = of_class(station.target, _LIMIT_S) if station.by_class else _click(truth)
+        result = recorder.look_at(goal, self._alive, _LIMIT_S + 10.0)
+        reason = "" if result.result == LookAt.Result.VERGED else result.reason
+        if station.moving:
+            recorder.set_parameters("sim_node", dict(station.motion), self._alive)
+            # It starts at full speed: the eyes get a second to go along before they have to stay on it.
+            recorder.settle(_GO_ALONG_S, self._alive)
+        recorder.settle(station.hold_s, self._alive)
+        after = recorder.picture(station.has_boxes, self._alive)
+        self._store(station, "end", after)
+        if station.moving:
+            recorder.set_parameters("sim_node", {"motion": "static"}, self._alive)
+        return self._result(station, began, marks, reason, before, after)
+
+    def _fixation_m(self) -> Sequence[float]:
+        """Return where the graph itself says that the axes meet, now that the eyes are still."""
+        now = self._recorder.now_s()
+        entry = self._recorder.wait_for(
+            "gaze/fixation_point from gaze_controller_node",
+            lambda: next((entry for entry in self._recorder.fixations[-1:] if entry.arrival_s >= now), None),
+            5.0,
+            self._alive,
+        )
+        point = entry.message.point
+        return point.x, point.y, point.z
+
+    def _seen(self, station: Station, since_s: float) -> Any:
+        entry = self._recorder.truths[-1]
+        truth = entry.message
+        exposed_s = to_seconds(truth.header.stamp)
+        inside = truth.target == station.target and exposed_s > since_s
+        return truth if inside and min(truth.left_visible_share, truth.right_visible_share) > 0.2 else None
+
+    def _store(self, station: Station, moment: str, picture: StereoPicture) -> None:
+        folder = self._out_dir / "pictures"
+        measured = self._edge_metric.measure(picture.left_bgr, picture.right_bgr)
+        windows = [int(size) for size in picture.edge.windows_px]
+        left, right = measured.left_edges.mask, measured.right_edges.mask
+        name = f"{station.name}_{moment}"
+        boxes = (None, None) if picture.box is None else (picture.box.left, picture.box.right)
+        for eye, view, box in zip(("left", "right"), (picture.left_bgr, picture.right_bgr), boxes, strict=True):
+            write_image(folder / f"{name}_{eye}.jpg", with_cross(_boxed(view, box)))
+        write_image(folder / f"{name}_left_edges.png", left)
+        write_image(folder / f"{name}_right_edges.png", right)
+        write_image(folder / f"{name}_combined.png", with_windows(combined_edges(left, right), windows))
+
+    def _result(
+        self,
+        station: Station,
+        began_s: float,
+        marks: tuple[int, int, int, int],
+        reason: str,
+        before: StereoPicture,
+        after: StereoPicture,
+    ) -> StationResult:
+        recorder = self._recorder
+        states, edges, truths, boxes = (
+            series[mark:]
+            for series, mark in zip(
+                (recorder.states, recorder.edges, recorder.truths, recorder.boxes), marks, strict=True
+            )
+        )
+        held_from_s = recorder.now_s() - station.hold_s
+        held = [entry.message.verged for entry in states if entry.arrival_s >= held_from_s]
+        # Single cycles without the word are allowed, in following a moving target or on a busy machine; not the end.
+        lately = [entry.message.verged for entry in states if entry.arrival_s >= recorder.now_s() - 0.5]
+        said = bool(held) and np.mean(held) >= 0.8 and np.mean(lately) >= 0.5 and not reason
+        if not said and not reason:
+            reason = (
+                f"verged in {100 * np.mean(held):.0f} % of the hold: {states[-1].message.reason}"
+                if held
+                else "no state"
+            )
+        said_at = next((entry.arrival_s for entry in states if entry.message.verged), math.nan)
+        end_truths = [entry.message for entry in truths if entry.arrival_s >= held_from_s]
+        final = truths[-1].message
+        fixation = states[-1].message.target
+        return StationResult(
+            name=station.name,
+            title=station.title,
+            moving=station.moving,
+            said_verged=bool(said),
+            reason=reason,
+            time_s=said_at - began_s,
+            true_error_deg=_median_deg([truth.vergence_error_rad for truth in end_truths]),
+            off_axis_deg=max(
+                _median_deg([truth.left_error_rad for truth in end_truths]),
+                _median_deg([truth.right_error_rad for truth in end_truths]),
+            ),
+            tolerance_deg=self._tolerance_deg,
+            off_axis_tolerance_deg=math.degrees(math.atan(_FOVEA_HALF_PX / self._rig.left_camera.fx_px)),
+            start=_table(before.edge),
+            end=_table(after.edge),
+            fixation_m=(fixation.x, fixation.y, fixation.z),
+            target_m=(final.target_point.x, final.target_point.y, final.target_point.z),
+            series=_series(began_s, states, edges, truths, boxes),
+            start_box=before.box and BoxFigures.from_message(before.box),
+            end_box=after.box and BoxFigures.from_message(after.box),
+        )
+
+
+def _click(truth: Any) -> LookAt.Goal:
+    """Return the goal of a person who clicks on the target in the left image: one pixel, no depth."""
+    goal = LookAt.Goal(kind=LookAt.Goal.PIXEL, eye=LookAt.Goal.EYE_LEFT, time_limit_s=_LIMIT_S, depth_m=math.nan)
+    goal.header.stamp = truth.header.stamp
+    goal.left_x_px, goal.left_y_px = float(round(truth.left_x_px)), float(round(truth.left_y_px))
+    return goal
+
+
+def _boxed(view: Image, box: Any) -> Image:
+    """Return the view with a BoundingBox drawn on it, if there is one."""
+    if box is None or not math.isfinite(box.x_min_px):
+        return view
+    return with_box(view, (box.x_min_px, box.y_min_px, box.x_max_px, box.y_max_px), f"{box.class_name} {box.score:.2f}")
+
+
+def _median_deg(values_rad: Sequence[float]) -> float:
+    return math.degrees(float(np.median(np.abs(values_rad)))) if len(values_rad) else math.nan
+
+
+def _table(edge: EdgeVergence) -> MetricTable:
+    windows = [int(size) for size in edge.windows_px]
+    return MetricTable(windows, list(edge.left_to_right_px), list(edge.right_to_left_px), list(edge.contrast))
+
+
+def _series(
+    began_s: float,
+    states: Sequence[Stamped],
+    edges: Sequence[Stamped],
+    truths: Sequence[Stamped],
+    boxes: Sequence[Stamped],
+) -> Series:
+    def stamps(entries: Sequence[Stamped]) -> Floats:
+        return np.array([to_seconds(entry.message.header.stamp) - began_s for entry in entries])
+
+    column = 0
+    if edges:
+        windows = list(edges[0].message.windows_px)
+        column = windows.index(100) if 100 in windows else 0
+    metric = [0.5 * (e.message.left_to_right_px[column] + e.message.right_to_left_px[column]) for e in edges]
+    true_vergence = np.array([entry.message.pan_right_rad - entry.message.pan_left_rad for entry in truths])
+    error = np.array([entry.message.vergence_error_rad for entry in truths])
+    return Series(
+        time_s=stamps(edges),
+        metric_px=np.array(metric, np.float64),
+        contrast=np.array([entry.message.contrast[column] for entry in edges], np.float64),
+        state_time_s=np.array([entry.arrival_s - began_s for entry in states]),
+        vergence_deg=np.degrees([entry.message.vergence_rad for entry in states]),
+        truth_time_s=stamps(truths),
+        true_vergence_deg=np.degrees(true_vergence),
+        wanted_vergence_deg=np.degrees(true_vergence + error),
+        true_disparity_px=np.array([entry.message.mean_disparity_px for entry in truths], np.float64),
+        box_time_s=stamps(boxes),
+        box_center_px=np.array([entry.message.center_horizontal_px for entry in boxes], np.float64),
+        box_refined_px=np.array([entry.message.refined_horizontal_px for entry in boxes], np.float64),
+    )

@@ -1,0 +1,65 @@
+"""The round of the demo's stations: what goes wrong at one becomes its reason, and the demo goes on. No ROS in it."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from vergence_bringup.demo.result import StationResult, unfinished
+from vergence_bringup.demo.stations import Station
+from vergence_bringup.ros.processes import ProcessError
+
+
+class GraphError(RuntimeError):
+    """The graph did not answer as it must."""
+
+
+class Runner(Protocol):
+    """Visits stations, as `demo_run.StationRunner` does."""
+
+    def wait_until_ready(self) -> None:
+        """Wait until every node has been heard; raises GraphError or ProcessError."""
+
+    def visit(self, station: Station) -> StationResult:
+        """Return what happened at a station; raises GraphError or ProcessError."""
+
+
+def visit_all(
+    runner: Runner, stations: Sequence[Station], results: list[StationResult], say: Callable[[str], None]
+) -> None:
+    """Visit one station after the other and append each result as it comes.
+
+    A station at which the graph does not answer has failed, with that reason, and the next is tried. A process that has
+    ended by itself, and a graph that never gets ready, fail every station that is left.
+    """
+    say("waiting for images, metrics and controller")
+    try:
+        runner.wait_until_ready()
+    except (GraphError, ProcessError) as error:
+        say(f"the graph did not get ready: {error}")
+        results += [unfinished(station, f"not visited: {_first_line(error)}") for station in stations]
+        return
+    for number, station in enumerate(stations, 1):
+        say(f"station {number} of {len(stations)}: {station.name}: {station.title}")
+        try:
+            result = runner.visit(station)
+        except GraphError as error:
+            result = unfinished(station, str(error))
+        except ProcessError as error:
+            say(str(error))
+            results.append(unfinished(station, _first_line(error)))
+            results += [unfinished(left, f"not visited: {_first_line(error)}") for left in stations[number:]]
+            return
+        results.append(result)
+        say(f"   {_verdict(result)}")
+
+
+def _verdict(result: StationResult) -> str:
+    said = "verged" if result.said_verged else f"NOT verged ({result.reason})"
+    took = f" after {result.time_s:.2f} s" if math.isfinite(result.time_s) else ""
+    truth = "agrees" if result.truth_agrees else "DISAGREES"
+    error = f"{result.true_error_deg:.2f}" if math.isfinite(result.true_error_deg) else "unknown"
+    return f"graph: {said}{took}; truth {truth}: vergence error {error} degree"
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).splitlines()[0]

@@ -1,0 +1,23 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="vergence_calibration",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/vergence_calibration"]),
+        ("share/vergence_calibration", ["package.xml"]),
+    ],
+    package_data={"vergence_calibration": ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Vergence maintainers",
+    maintainer_email="vergence-maintainers@example.org",
+    description="Servos calibrated and a running head identified, by hand or by vision.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "calibrate_servos = vergence_calibration.ros.calibrate_servos:main",
+        ]
+    },
+)

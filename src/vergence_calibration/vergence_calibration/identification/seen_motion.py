@@ -1,0 +1,108 @@
+"""How an eye turned in the course of a recording."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vergence_calibration.eye_turn import Image, NoMotionSeenError, Sight
+from vergence_calibration.identification.axis_log import Frames, IdentifyError
+from vergence_rig.camera import CameraModel
+
+Array = npt.NDArray[np.float64]
+
+_WIDTH_PX = 320
+_LEAST_USABLE = 0.7
+_LEAST_FRAMES = 8
+
+
+@dataclass(frozen=True)
+class SeenMotion:
+    """One eye's turn since the first frame, (n,) each: stamps and arrivals [s], pan and tilt [rad], agreement.
+
+    Frames in which nothing was found again are NaN.
+    """
+
+    stamps_s: Array
+    arrivals_s: Array
+    pan_rad: Array
+    tilt_rad: Array
+    agreement: Array
+
+
+def shrunk(picture: Image) -> Image:
+    """Return a grey picture (h, w) of 320 px width or less: small enough to keep hundreds of them."""
+    grey = picture if picture.ndim == 2 else np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
+    if grey.shape[1] <= _WIDTH_PX:
+        return np.ascontiguousarray(grey)
+    size = (_WIDTH_PX, round(grey.shape[0] * _WIDTH_PX / grey.shape[1]))
+    return np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
+
+
+def shrunk_camera(camera: CameraModel, picture: Image) -> CameraModel:
+    """Return the camera of a picture that was made smaller. Raises IdentifyError where the shapes differ."""
+    height, width = picture.shape[:2]
+    x, y = width / camera.width_px, height / camera.height_px
+    if abs(x / y - 1.0) > 0.02:
+        raise IdentifyError(
+            f"camera_info is of {camera.width_px}x{camera.height_px} px, the pictures are shaped {width}:{height}: "
+            "allowed is one shape; calibrate the camera in the mode it runs in"
+        )
+    middle_x, middle_y = (camera.cx_px + 0.5) * x - 0.5, (camera.cy_px + 0.5) * y - 0.5
+    k = [camera.fx_px * x, 0.0, middle_x, 0.0, camera.fy_px * y, middle_y, 0.0, 0.0, 1.0]
+    return CameraModel.from_camera_info_values(
+        width, height, k, [float(value) for value in camera.distortion], camera.distortion_model
+    )
+
+
+def seen_motion(frames: Frames, camera: CameraModel, where: str) -> SeenMotion:
+    """Return how the eye turned.
+
+    Args:
+        frames: the recording.
+        camera: of the pictures as they were taken.
+        where: the words for the error, as "pan_left, left eye".
+
+    Raises:
+        IdentifyError: too few frames, or too little to be found again in them.
+    """
+    count = len(frames.stamps_s)
+    if count < _LEAST_FRAMES:
+        raise IdentifyError(f"{where}: {count} images came during the moves: allowed are {_LEAST_FRAMES} or more")
+    turns = np.full((count, 3), np.nan)
+    try:
+        sight = Sight(frames.pictures[0], shrunk_camera(camera, frames.pictures[0]))
+    except NoMotionSeenError as error:
+        raise IdentifyError(f"{where}: {error}; let it look at something with texture") from None
+    problem = ""
+    for i, picture in enumerate(frames.pictures):
+        try:
+            turn = sight.turn(picture)
+        except NoMotionSeenError as error:
+            problem = str(error)
+            continue
+        turns[i] = turn.pan_rad, turn.tilt_rad, turn.agreement
+    usable = float(np.isfinite(turns[:, 0]).mean())
+    if usable < _LEAST_USABLE:
+        raise IdentifyError(
+            f"{where}: motion was seen in {usable:.0%} of {count} images: allowed is {_LEAST_USABLE:.0%} or more "
+            f"({problem}; is the light steady, does something hide the view?)"
+        )
+    return SeenMotion(np.array(frames.stamps_s), np.array(frames.arrivals_s), turns[:, 0], turns[:, 1], turns[:, 2])
+
+
+def settled(stamps_s: Array, values: Array, commands_s: Array) -> Array:
+    """Return the value at the end of every command's rest, (n,): the median of the last three before the next.
+
+    NaN where none came. The last rest ends with the recording.
+    """
+    found = np.full(len(commands_s), np.nan)
+    ends_s = [*commands_s[1:], math.inf]
+    known = np.isfinite(values)
+    for k, (begin_s, end_s) in enumerate(zip(commands_s, ends_s, strict=True)):
+        inside = np.flatnonzero(known & (stamps_s > begin_s) & (stamps_s < end_s))
+        if len(inside):
+            found[k] = np.median(values[inside[-3:]])
+    return found

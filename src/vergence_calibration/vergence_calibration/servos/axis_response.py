@@ -1,0 +1,77 @@
+"""What a servo does with small moves, from commanded pulses and the angles that were seen."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from vergence_calibration.lost_motion import LoopError, fit_loop
+from vergence_rig.parameters import ParameterError
+from vergence_servo.calibration import CalibrationError, ServoCalibration
+
+_GAINS_RAD_PER_US = (math.radians(0.02), math.radians(0.35))
+
+
+@dataclass(frozen=True)
+class AxisResponse:
+    """sign of the gain, its size [rad/us], lost motion (dead band plus backlash) [rad], and how well it fits [rad]."""
+
+    sign: int
+    gain_rad_per_us: float
+    lost_motion_rad: float
+    residual_rad: float
+    samples: int
+
+
+def axis_response(pulses_us: Sequence[float], angles_rad: Sequence[float]) -> AxisResponse:
+    """Return the servo's response from the pulses sent, in order, and the angle seen after each.
+
+    Args:
+        pulses_us: at least 8, with moves in both directions.
+        angles_rad: as many; only their differences count.
+
+    Raises:
+        CalibrationError: too few samples, no motion seen, or a gain that no servo has.
+    """
+    try:
+        loop = fit_loop(pulses_us, angles_rad)
+    except LoopError as error:
+        raise CalibrationError(str(error)) from error
+    low, high = _GAINS_RAD_PER_US
+    if not low <= abs(loop.gain) <= high:
+        raise CalibrationError(
+            f"the eye turned by {math.degrees(loop.gain):+.4f} degrees per us: allowed is {math.degrees(low):.2f} to "
+            f"{math.degrees(high):.2f} either way (is the right servo plugged in, and does the camera see enough?)"
+        )
+    if loop.residual > 0.25 * abs(loop.gain) * (max(pulses_us) - min(pulses_us)):
+        raise CalibrationError(
+            f"what was seen does not follow the pulses (off by {math.degrees(loop.residual):.2f} degrees)"
+        )
+    return AxisResponse(1 if loop.gain > 0 else -1, abs(loop.gain), loop.lost, loop.residual, loop.samples)
+
+
+def calibrated(old: ServoCalibration, response: AxisResponse, offset_rad: float = 0.0) -> ServoCalibration:
+    """Return the calibration with the response's sign, gain, dead band and backlash.
+
+    Joint angle 0 stays at its pulse, corrected by `offset_rad`: where the joint really was when it was told 0. Dead
+    band and backlash share the lost motion as they do in `old`. Raises CalibrationError.
+    """
+    centre_us = old.pulse_us(0.0) - response.sign * offset_rad / response.gain_rad_per_us
+    known = old.dead_band_rad + old.backlash_rad
+    share = old.dead_band_rad / known if known > 0 else 0.5
+    reach_rad = math.radians(60.0)
+    half_us = reach_rad / response.gain_rad_per_us
+    while centre_us - half_us < 300.0 or centre_us + half_us > 2700.0:
+        reach_rad, half_us = 0.9 * reach_rad, 0.9 * half_us
+        if reach_rad < math.radians(5.0):
+            raise CalibrationError(f"joint angle 0 would be at {centre_us:.0f} us: no servo reaches that")
+    try:
+        return old.replaced(
+            angles_rad=(-reach_rad, reach_rad),
+            pulses_us=(centre_us - half_us, centre_us + half_us),
+            sign=response.sign,
+            trim_rad=0.0,
+            dead_band_rad=min(share * response.lost_motion_rad, 0.2),
+            backlash_rad=min((1 - share) * response.lost_motion_rad, 0.2),
+        )
+    except ParameterError as error:
+        raise CalibrationError(str(error)) from error

@@ -1,0 +1,23 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="vergence_gaze",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/vergence_gaze"]),
+        ("share/vergence_gaze", ["package.xml"]),
+    ],
+    package_data={"vergence_gaze": ["py.typed"]},
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="Vergence maintainers",
+    maintainer_email="vergence-maintainers@example.org",
+    description="Metrics to joint commands: the goals, the estimate of the target and the control laws.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "gaze_controller_node = vergence_gaze.ros.gaze_controller_node:main",
+        ]
+    },
+)

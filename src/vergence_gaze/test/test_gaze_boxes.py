@@ -1,0 +1,207 @@
+"""Boxes beside the other estimators: what they add to a click, when they win, and when they are not heeded."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vergence_gaze.control.controller import GazeController
+from vergence_gaze.estimation.observations import JointResolution, Observation, PointSighting
+from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, Result
+from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.testing.fake_head import FakeHead, Seeing
+from vergence_rig.rig import default_rig
+from vergence_rig.servo import IDEAL, SG90, ServoSpec
+
+DETECTOR = Seeing(boxes=True, track=False, box_frame_ticks=30, box_latency_s=0.14, box_noise_px=1.5)
+PLACE = np.array([0.8, 0.1, 0.02])
+BEHIND = 1.5 * PLACE
+
+
+class Run:
+    """A controller and a head in lockstep at 100 Hz, with what they did."""
+
+    def __init__(
+        self,
+        seeing: Seeing,
+        mistaken: Mapping[str, Callable[[float], Any]],
+        servo: ServoSpec = IDEAL,
+        real: ServoSpec | None = None,
+        **parameters: Any,
+    ) -> None:
+        rig = default_rig().with_servos(servo)
+        servos = {} if real is None else {name: real for name, _ in rig.joints.items()}
+        start = {"pan_right": 0.05}
+        self.head = FakeHead(rig, lambda time_s: PLACE, seeing, 3, start, mistaken=mistaken, servos=servos)
+        self.controller = GazeController(rig, GazeParameters(**parameters))
+        self.outcomes: list[Outcome] = []
+        self.errors_deg: list[np.ndarray] = []
+        self.commands: list[np.ndarray] = []
+        self.verged: list[bool] = []
+        self.until(0.1)
+
+    def until(self, time_s: float, extra: Callable[[float], list[Observation]] = lambda time_s: []) -> None:
+        arrived: list[Observation] = []
+        ticks = 0
+        while self.head.time_s < time_s:
+            arrived += self.head.advance()
+            ticks += 1
+            if ticks % 3:
+                continue
+            command = self.controller.step(self.head.time_s, [*arrived, *extra(self.head.time_s)])
+            arrived = []
+            if command.joints_rad is not None:
+                self.head.command(command.joints_rad)
+                self.commands.append(command.joints_rad)
+            self.report = command.report
+            self.outcomes += command.outcomes
+            self.errors_deg.append(np.degrees(self.head.true_errors_rad()))
+            self.verged.append(command.report.verged)
+
+    def click(self) -> None:
+        x, y = self.head.project(PLACE, left=True)
+        goal = Goal(GoalKind.PIXEL, left_xy=(float(x), float(y)), time_limit_s=60.0)
+        self.controller.look_at(goal, self.head.time_s)
+
+    def find(self) -> None:
+        goal = Goal(GoalKind.CLASS, class_name="target", time_limit_s=60.0)
+        self.controller.look_at(goal, self.head.time_s)
+
+    def worst_deg(self, samples: int) -> float:
+        return float(np.abs(self.errors_deg[-samples:]).max())
+
+
+def always(point_m: np.ndarray) -> Callable[[float], np.ndarray]:
+    return lambda time_s: point_m
+
+
+@pytest.mark.parametrize("servo", [IDEAL, SG90], ids=["ideal", "sg90"])
+def test_a_slow_detector_is_enough_for_a_class(servo: ServoSpec) -> None:
+    run = Run(DETECTOR, {}, servo)
+    run.find()
+    run.until(3.0)
+    assert run.outcomes[0].result is Result.VERGED
+    assert run.outcomes[0].time_s < 1.5
+    assert run.worst_deg(100) < (0.25 if servo is IDEAL else 0.75)
+
+
+@pytest.mark.parametrize("by_class", [True, False])
+def test_boxes_win_over_a_fovea_that_looks_past_a_small_target(by_class: bool) -> None:
+    seeing = replace(DETECTOR, extent_rad=0.02)
+    run = Run(seeing, {"fovea": always(BEHIND)}, contrast="ignored")
+    run.find() if by_class else run.click()
+    run.until(3.0)
+    assert run.worst_deg(100) < 0.4
+    # without boxes, a click would have ended on what lies behind
+    blind = Run(replace(seeing, boxes=False), {"fovea": always(BEHIND)}, contrast="ignored")
+    blind.click()
+    blind.until(3.0)
+    assert abs(blind.errors_deg[-1][1]) > 1.0
+
+
+def test_boxes_keep_a_click_beside_their_middle() -> None:
+    beside = PLACE + np.array([0.0, 0.02, 0.01])
+    run = Run(DETECTOR, {"box": always(beside)})
+    run.click()
+    run.until(3.0)
+    assert run.outcomes[0].result is Result.VERGED
+    assert run.worst_deg(100) < 0.45
+
+
+def test_boxes_of_something_else_change_nothing() -> None:
+    elsewhere = np.array([0.5, -0.1, 0.0])
+    run = Run(replace(DETECTOR, track=True), {"box": always(elsewhere)})
+    run.click()
+    run.until(3.0)
+    assert run.outcomes[0].result is Result.VERGED
+    assert run.worst_deg(100) < 0.25
+
+
+def test_boxes_say_that_the_tracker_went_astray() -> None:
+    seeing = replace(DETECTOR, track=True, extent_rad=0.02)
+    run = Run(seeing, {"track": lambda time_s: BEHIND if time_s > 1.0 else None})
+    run.click()
+    run.until(4.0)
+    assert run.worst_deg(150) < 0.4
+
+
+def test_three_that_disagree_hold_the_eyes_still() -> None:
+    seeing = replace(DETECTOR, track=True, extent_rad=0.02)
+    wrong = {
+        "track": lambda time_s: BEHIND if time_s > 1.0 else None,
+        "fovea": lambda time_s: 0.55 * PLACE if time_s > 1.0 else None,
+    }
+    run = Run(seeing, wrong, contrast_enter=0.01)  # so that the goal is still in hand when they begin to differ
+    run.click()
+    run.until(3.5)
+    assert run.outcomes[0].result is Result.DISAGREEMENT
+    assert "disagree" in run.outcomes[0].reason
+    assert np.ptp(run.commands[-20:], axis=0).max() == 0.0
+
+
+@pytest.mark.parametrize("episode_s", [0.25, 0.8])
+def test_boxes_that_jump_to_a_distractor_do_not_pull_the_eyes(episode_s: float) -> None:
+    nearer = np.array([0.5, -0.12, 0.0])
+    run = Run(DETECTOR, {"box": lambda time_s: nearer if 2.0 < time_s < 2.0 + episode_s else None}, SG90)
+    run.find()
+    run.until(2.0)
+    assert run.verged[-1]
+    run.until(4.0)
+    assert run.worst_deg(200) < 0.75
+    assert all(run.verged[-200:])
+
+
+def test_boxes_that_stay_elsewhere_are_followed_in_the_end() -> None:
+    nearer = np.array([0.5, -0.12, 0.0])
+    run = Run(DETECTOR, {"box": lambda time_s: nearer if time_s > 2.0 else None})
+    run.find()
+    run.until(5.0)
+    assert abs(run.errors_deg[-1][0]) > 10.0
+
+
+def test_boxes_of_a_streamed_point_help() -> None:
+    off = PLACE + np.array([0.0, 0.012, 0.0])
+    run = Run(DETECTOR, {}, SG90)
+    run.until(3.0, lambda time_s: [PointSighting(time_s, tuple(PLACE), math.nan)])
+    assert run.report.verged
+    # a point beside the object is kept, not drawn to the middle of its box
+    run.until(5.0, lambda time_s: [PointSighting(time_s, tuple(off), math.nan)])
+    pans = np.degrees(math.atan2(off[1], off[0]) - math.atan2(PLACE[1], PLACE[0]))
+    assert run.errors_deg[-1][0] == pytest.approx(-pans, abs=0.75)
+
+
+COARSE = SG90.replaced(pulse_step_rad=0.0077)  # a PCA9685 at 50 Hz
+
+
+def tell(time_s: float) -> list[Observation]:
+    return [JointResolution(time_s, dict.fromkeys(("pan_left", "pan_right", "tilt"), COARSE.pulse_step_rad))]
+
+
+def test_a_coarse_resolution_is_believed_and_widens_what_is_stated() -> None:
+    widths, turns = {}, {}
+    for told in (False, True):
+        run = Run(Seeing(), {}, SG90, real=COARSE)
+        run.until(0.2, tell if told else lambda time_s: [])
+        run.click()
+        run.until(5.0)
+        target = run.report.target
+        widths[told] = target.high_m - target.low_m
+        turns[told] = int(np.count_nonzero(np.abs(np.diff(run.commands[-300:], axis=0)).max(axis=1)))
+        if told:
+            assert run.outcomes[0].result is Result.VERGED
+            assert all(run.verged[-100:])
+            assert target.low_m < float(np.linalg.norm(PLACE)) < target.high_m
+            np.testing.assert_allclose(run.controller.resolution_rad, COARSE.pulse_step_rad)
+    assert widths[True] > 1.3 * widths[False]
+    assert turns[True] <= 3
+
+
+def test_a_resolution_that_cannot_be_changes_nothing() -> None:
+    run = Run(Seeing(), {}, SG90)
+    before = run.controller.resolution_rad
+    odd = {"pan_left": math.nan, "pan_right": -0.1, "tilt": 9.0, "elbow": 0.01}
+    run.until(0.3, lambda time_s: [JointResolution(time_s, odd)])
+    np.testing.assert_array_equal(run.controller.resolution_rad, before)

@@ -1,0 +1,86 @@
+"""Which pairs count while the eyes turn, and when two estimators are said to disagree."""
+
+import math
+
+import numpy as np
+import pytest
+
+from vergence_gaze.estimation.consistency_monitor import Agreement
+from vergence_gaze.estimation.exposures import Exposures, positive_sigma
+from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.joints.joint_history import JointHistory
+from vergence_gaze.parameters import GazeParameters
+from vergence_rig.rig import JOINT_NAMES, default_rig
+
+PAIR_S = 1.0 / 30.0
+
+
+def turning(speed_rad_s: float) -> Exposures:
+    """Eyes that turn at this speed, reported at 50 Hz from 0 to 1 s."""
+    history = JointHistory(default_rig())
+    for i in range(51):
+        history.add(0.02 * i, dict.fromkeys(JOINT_NAMES, speed_rad_s * 0.02 * i))
+    return Exposures(GazeParameters(), history)
+
+
+def target(rate_rad_s: float, moving: bool = True) -> TargetEstimate:
+    return TargetEstimate(np.zeros(3), np.array([rate_rad_s, 0.0, rate_rad_s]), np.eye(3) * 1e-6, moving)
+
+
+@pytest.mark.parametrize(
+    ("eyes_rad_s", "seen", "counts"),
+    [
+        (0.1, None, True),
+        (1.0, None, False),
+        (1.0, target(1.0), True),  # they go along with it
+        (1.0, target(1.0, moving=False), False),
+        (2.5, target(1.0), True),  # they catch up with it
+        (10.0, target(1.0), False),  # a saccade
+    ],
+)
+def test_images_count_while_the_eyes_rest_or_go_along(
+    eyes_rad_s: float, seen: TargetEstimate | None, counts: bool
+) -> None:
+    assert turning(eyes_rad_s).were_still(0.5, 0.01, seen) is counts
+
+
+@pytest.mark.parametrize(("stamp_s", "skew_s"), [(math.nan, 0.0), (0.5, math.inf), (0.5, 0.2), (-1.0, 0.0), (9.0, 0.0)])
+def test_stamps_that_mean_nothing_do_not_count(stamp_s: float, skew_s: float) -> None:
+    assert not turning(0.0).were_still(stamp_s, skew_s, target(1.0))
+
+
+def test_a_turning_eye_knows_its_direction_less_well() -> None:
+    at_rest, fast = turning(0.0).sigma(0.5, 0.01, 0.001), turning(1.0).sigma(0.5, 0.01, 0.001)
+    assert at_rest == pytest.approx(0.001)
+    assert 0.003 < fast < 0.01
+
+
+def test_a_stated_sigma_is_held_to_what_is_sensible() -> None:
+    assert [positive_sigma(value, 0.01) for value in (math.nan, -1.0, 0.0, 0.02, 9.0)] == [0.01, 0.01, 0.01, 0.02, 0.5]
+
+
+def differing(agreement: Agreement, pairs: int, from_s: float = 0.0) -> float:
+    for i in range(pairs):
+        stamp_s = from_s + i * PAIR_S
+        agreement.see_track(stamp_s, 0.08, 0.0)
+        agreement.see_fovea(stamp_s, 0.14)
+    return from_s + pairs * PAIR_S
+
+
+@pytest.mark.parametrize(("moving", "lasts_s"), [(False, 10 * PAIR_S), (True, 24 * PAIR_S)])
+def test_of_a_moving_target_estimators_may_differ_for_longer(moving: bool, lasts_s: float) -> None:
+    agreement, pairs = Agreement(0.02), 0
+    while not agreement.disagreement(moving):
+        differing(agreement, 1, pairs * PAIR_S)
+        pairs += 1
+    assert pairs * PAIR_S == pytest.approx(lasts_s)
+
+
+def test_a_disagreement_ends_once_the_fovea_is_silent() -> None:
+    agreement = Agreement(0.02)
+    begin_s = differing(agreement, 40)
+    assert agreement.disagreement(moving=True)
+    for i in range(12):
+        agreement.see_track(begin_s + i * PAIR_S, 0.08, 0.0)
+    assert not agreement.disagreement(moving=False)
+    assert not agreement.doubtful

@@ -1,0 +1,1 @@
+"""The control loop: perception, phases and law in one step, and its report."""

@@ -1,0 +1,112 @@
+"""What the controller says of itself every cycle, as GazeState carries it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_gaze.control.perception import Perception
+from vergence_gaze.estimation.distance import TargetPosition
+from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.goals.goal import Outcome
+from vergence_gaze.phases import Phase, PhaseMachine
+from vergence_rig.geometry import GeometryError, eye_direction, eye_position, fixation_of_rays
+from vergence_rig.rig import Rig
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GazeReport:
+    """Angles are estimated, residuals (version, vergence, tilt) are what is left to turn; NaN where unknown.
+
+    `fixation_m` (3,) is the midpoint of the gaze rays' closest approach and `miss_distance_m` how far they pass.
+    """
+
+    stamp_s: float
+    phase: Phase
+    reason: str
+    law: str
+    mode: str
+    verged: bool
+    target_moving: bool
+    version_rad: float
+    vergence_rad: float
+    tilt_rad: float
+    residual_rad: tuple[float, float, float]
+    residual_px: float
+    contrast: float
+    target: TargetPosition
+    fixation_m: Array
+    miss_distance_m: float
+
+
+@dataclass(frozen=True)
+class Command:
+    """One cycle's result: joint angles (3,) that were sent, None before the joints are known; and goals that ended."""
+
+    joints_rad: Array | None
+    report: GazeReport
+    outcomes: tuple[Outcome, ...]
+
+
+def report_of(now_s: float, seen: Perception, phases: PhaseMachine, law: str, mode: str, rig: Rig) -> GazeReport:
+    """Return what is known at `now_s`, and what is done about it by which law and mode."""
+    known = seen.history.known and math.isfinite(now_s)
+    joints = seen.history.shaft_rad if known else np.full(3, math.nan)
+    estimate = seen.tracking.estimate(now_s) if known else None
+    residual = residual_of(estimate, joints)
+    fixation, miss = fixation_of_joints(joints, rig.baseline_m)
+    reason = phases.reason if known else "no joint_states have arrived"
+    if phases.phase is Phase.VERGE and not seen.judge.verged:
+        reason = f"{reason}; {seen.tracking.note or seen.judge.reason}"
+    return GazeReport(
+        stamp_s=seen.pair_s if math.isfinite(seen.pair_s) else now_s,
+        phase=phases.phase,
+        reason=reason,
+        law=law,
+        mode=mode,
+        verged=seen.judge.verged,
+        target_moving=seen.tracking.filter.moving,
+        version_rad=0.5 * float(joints[0] + joints[1]),
+        vergence_rad=float(joints[1] - joints[0]),
+        tilt_rad=float(joints[2]),
+        residual_rad=residual,
+        residual_px=disparity_px(residual[1], rig.left_camera.fx_px),
+        contrast=seen.judge.contrast,
+        target=seen.position(estimate),
+        fixation_m=fixation,
+        miss_distance_m=miss,
+    )
+
+
+def residual_of(estimate: TargetEstimate | None, joints_rad: Array) -> tuple[float, float, float]:
+    """Return version, vergence and tilt [rad] that are left to turn from these joint angles (3,); NaN if unknown."""
+    if estimate is None:
+        return math.nan, math.nan, math.nan
+    version, vergence = 0.5 * float(joints_rad[0] + joints_rad[1]), float(joints_rad[1] - joints_rad[0])
+    return estimate.version_rad - version, estimate.vergence_rad - vergence, estimate.tilt_rad - float(joints_rad[2])
+
+
+def disparity_px(vergence_residual_rad: float, focal_px: float) -> float:
+    """Return the horizontal disparity [px] that a vergence residual shows as at the fovea; NaN for NaN."""
+    if not abs(vergence_residual_rad) < 1.5:
+        return math.nan
+    return focal_px * math.tan(vergence_residual_rad)
+
+
+def fixation_of_joints(joints_rad: Array, baseline_m: float) -> tuple[Array, float]:
+    """Return where the axes at these joint angles (3,) meet, (3,) [m], and their miss distance; NaN if nowhere."""
+    if not np.isfinite(joints_rad).all():
+        return np.full(3, math.nan), math.nan
+    try:
+        fixation = fixation_of_rays(
+            eye_position(True, baseline_m),
+            eye_direction(joints_rad[0], joints_rad[2]),
+            eye_position(False, baseline_m),
+            eye_direction(joints_rad[1], joints_rad[2]),
+        )
+    except GeometryError:
+        return np.full(3, math.nan), math.nan
+    return fixation.point_m, fixation.miss_distance_m

@@ -1,0 +1,171 @@
+"""Visual errors to directions in rig_base, with the joint angles at the image's own stamp, as filter measurements.
+
+A ray seen by an eye at (pan, tilt) has a pan and tilt of its own: those that would bring it to that eye's fovea. They
+are exact for the left eye at any distance, since tilting the bar does not move the eyes.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_gaze.estimation.kalman import Measurement
+from vergence_gaze.estimation.observations import BoxSighting, TrackSighting
+from vergence_gaze.joints.joint_history import JointHistory
+from vergence_rig.geometry import UnreachableError, angles_of_direction, gaze_for_point, rotation_rig_from_eye
+
+Array = npt.NDArray[np.float64]
+
+# Rows over (version, vergence, tilt)
+_LEFT_PAN = (1.0, -0.5, 0.0)
+_RIGHT_PAN = (1.0, 0.5, 0.0)
+_VERGENCE = (0.0, 1.0, 0.0)
+_TILT = (0.0, 0.0, 1.0)
+_VERSION = (1.0, 0.0, 0.0)
+
+_LARGEST_TANGENT = 10.0
+_WIDEST_RAD = 1.5
+
+
+class SightingError(ValueError):
+    """A sighting that gives no direction: not finite, outside any lens, or older than what is known of the joints."""
+
+
+def direction_angles(pan_rad: float, tilt_rad: float, x: float, y: float) -> tuple[float, float]:
+    """Return (pan, tilt) [rad] that would bring normalised image coordinates (x right, y down) to the fovea.
+
+    Raises SightingError for coordinates that are not finite or absurd.
+    """
+    if not (abs(x) <= _LARGEST_TANGENT and abs(y) <= _LARGEST_TANGENT):
+        raise SightingError(f"normalised coordinates are ({x:g}, {y:g}): allowed is at most {_LARGEST_TANGENT:g}")
+    try:
+        return angles_of_direction(rotation_rig_from_eye(pan_rad, tilt_rad) @ (1.0, -x, -y))
+    except UnreachableError as error:
+        raise SightingError(str(error)) from error
+
+
+def spread_of_eye(left: bool, direction_sigma_rad: float, vergence_sigma_rad: float) -> Array:
+    """Return the covariance (3, 3) of version, vergence, tilt for a direction known in one eye and a vague vergence.
+
+    If the vergence turns out larger by some angle, the version does by half of it: the eye that sees stays where it is.
+    """
+    lean = 0.5 if left else -0.5
+    covariance = np.diag([direction_sigma_rad**2, 0.0, direction_sigma_rad**2])
+    along = np.array([lean, 1.0, 0.0]) * vergence_sigma_rad
+    return covariance + np.outer(along, along)
+
+
+def one_eye(
+    history: JointHistory, left: bool, stamp_s: float, x: float, y: float, sigma_rad: float
+) -> tuple[Measurement, tuple[float, float]]:
+    """Return the measurement of a direction in one eye, and that direction's (pan, tilt) [rad]."""
+    joints = _joints(history, stamp_s)
+    pan, tilt = direction_angles(joints[0] if left else joints[1], joints[2], x, y)
+    rows = np.array([_LEFT_PAN if left else _RIGHT_PAN, _TILT])
+    return Measurement(rows, np.array([pan, tilt]), np.array([sigma_rad] * 2), np.array([stamp_s] * 2)), (pan, tilt)
+
+
+def both_eyes(
+    history: JointHistory,
+    stamp_s: float,
+    skew_s: float,
+    left_xy: tuple[float, float],
+    right_x: float,
+    sigma_rad: float,
+    disparity_sigma_rad: float,
+) -> tuple[Measurement, tuple[float, float, float]]:
+    """Return the measurement of one pair, and (left pan, right pan, tilt) [rad] of the target.
+
+    The right eye's height in the image is not used: a mount that is off by pixels would tilt the target.
+    """
+    at_left, at_right = _joints(history, stamp_s), _joints(history, stamp_s + skew_s)
+    left_pan, tilt = direction_angles(at_left[0], at_left[2], *left_xy)
+    right_pan, _ = direction_angles(at_right[1], at_right[2], right_x, left_xy[1])
+    rows = np.array([_LEFT_PAN, _RIGHT_PAN, _TILT])
+    stamps = np.array([stamp_s, stamp_s + skew_s, stamp_s])
+    right_sigma = math.hypot(sigma_rad, disparity_sigma_rad)
+    values = np.array([left_pan, right_pan, tilt])
+    return Measurement(rows, values, np.array([sigma_rad, right_sigma, sigma_rad]), stamps), (left_pan, right_pan, tilt)
+
+
+def fovea_vergence(
+    history: JointHistory, stamp_s: float, skew_s: float, disparity_rad: float, sigma_rad: float
+) -> Measurement:
+    """Return the measurement of the vergence that fixates what lies at the left fovea."""
+    at_left, at_right = _joints(history, stamp_s), _joints(history, stamp_s + skew_s)
+    if not abs(disparity_rad) < 1.5:
+        raise SightingError(f"disparity is {disparity_rad:g} rad: allowed is less than 1.5")
+    right_pan, _ = direction_angles(at_right[1], at_right[2], math.tan(-disparity_rad), 0.0)
+    value = right_pan - float(at_left[0])
+    return Measurement(np.array([_VERGENCE]), np.array([value]), np.array([sigma_rad]), np.array([stamp_s]))
+
+
+def point(
+    history: JointHistory, stamp_s: float, point_m: tuple[float, float, float], baseline_m: float, sigma_rad: float
+) -> Measurement:
+    """Return the measurement of a point in rig_base."""
+    try:
+        eyes = gaze_for_point(point_m, baseline_m)
+    except UnreachableError as error:
+        raise SightingError(str(error)) from error
+    values = np.array([eyes.version_rad, eyes.vergence_rad, eyes.tilt_rad])
+    rows = np.array([_VERSION, _VERGENCE, _TILT])
+    return Measurement(rows, values, np.array([sigma_rad] * 3), np.array([stamp_s] * 3))
+
+
+def track(
+    history: JointHistory, sighting: TrackSighting, sigma_rad: float, disparity_sigma_rad: float
+) -> tuple[Measurement, Array]:
+    """Return the measurement of a track, and (left pan, right pan, tilt) (3,) [rad] of what it follows.
+
+    The right pan is NaN where only the left eye sees it.
+    """
+    left_xy = (sighting.left_x, sighting.left_y)
+    if math.isfinite(sighting.disparity_rad):
+        right_x = _tangent(math.atan(sighting.left_x) - sighting.disparity_rad)
+        measurement, seen = both_eyes(
+            history, sighting.stamp_s, sighting.skew_s, left_xy, right_x, sigma_rad, disparity_sigma_rad
+        )
+        return measurement, np.array(seen)
+    measurement, (pan, tilt) = one_eye(history, True, sighting.stamp_s, *left_xy, sigma_rad)
+    return measurement, np.array([pan, math.nan, tilt])
+
+
+def box(
+    history: JointHistory, sighting: BoxSighting, sigma_rad: float, disparity_sigma_rad: float = 0.0
+) -> tuple[Measurement, Array]:
+    """Return the measurement of a detected target, and its (left pan, right pan, tilt) (3,) [rad], NaN where unseen.
+
+    The disparity of the surface inside the boxes, where there is one, is better than that of their centres.
+    """
+    left_xy = (_tangent(sighting.left_azimuth_rad), _tangent(sighting.left_elevation_rad))
+    right_xy = (_tangent(sighting.right_azimuth_rad), _tangent(sighting.right_elevation_rad))
+    if math.isfinite(left_xy[0]) and math.isfinite(right_xy[0]):
+        disparity = sighting.surface_disparity_rad
+        right_x = _tangent(sighting.left_azimuth_rad - disparity) if math.isfinite(disparity) else right_xy[0]
+        measurement, both = both_eyes(
+            history, sighting.stamp_s, sighting.skew_s, left_xy, right_x, sigma_rad, disparity_sigma_rad
+        )
+        return measurement, np.array(both)
+    in_left = math.isfinite(left_xy[0])
+    stamp_s = sighting.stamp_s + (0.0 if in_left else sighting.skew_s)
+    measurement, (pan, tilt) = one_eye(history, in_left, stamp_s, *(left_xy if in_left else right_xy), sigma_rad)
+    return measurement, np.array([pan if in_left else math.nan, math.nan if in_left else pan, tilt])
+
+
+def shifted(measurement: Measurement, pan_rad: float, tilt_rad: float) -> Measurement:
+    """Return the measurement of a point this far beside the one that was seen, at the same depth [rad]."""
+    by = np.where(measurement.coefficients[:, 2] != 0, tilt_rad, pan_rad)
+    return replace(measurement, values=measurement.values + by)
+
+
+def _tangent(angle_rad: float) -> float:
+    """Return the normalised coordinate of an angle; NaN for one that no lens sees."""
+    return math.tan(angle_rad) if abs(angle_rad) < _WIDEST_RAD else math.nan
+
+
+def _joints(history: JointHistory, stamp_s: float) -> Array:
+    if not (math.isfinite(stamp_s) and history.covers(stamp_s)):
+        raise SightingError(f"stamp is {stamp_s!r} s: no joint angles are known for it")
+    return history.shaft_at(stamp_s)

@@ -1,0 +1,100 @@
+"""How far the target is, and how sure that is.
+
+The shaft of a hobby servo lies somewhere in its dead band and play; the side it came from tells where, as far as the
+servo is like its data sheet. The vergence that the filter believes in, however steady, carries what is left of that
+doubt: half a degree is 13 cm at one metre.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.vergence_offset import VergenceOffset
+from vergence_rig.geometry import GeometryError, point_at
+from vergence_rig.rig import Rig
+
+Array = npt.NDArray[np.float64]
+
+_TO_95_PERCENT = 1.9  # servo errors are bounded: their tails are lighter than a normal distribution has
+_PLAY_DOUBT = 0.22 / math.sqrt(3.0)
+"""Dead band and play of a servo are each within a fifth or so of its data sheet; which side it rests on is known."""
+_SHARED_NOISE = 1.6
+"""Estimators that read the same pair share its noise, which the filter takes for independent."""
+
+
+@dataclass(frozen=True)
+class TargetPosition:
+    """The target in rig_base (3,) [m], covariance (3, 3) [m^2], and distance with its 95 % interval [m]."""
+
+    point_m: Array
+    covariance_m2: Array
+    distance_m: float
+    low_m: float
+    high_m: float
+
+
+UNKNOWN = TargetPosition(np.full(3, math.nan), np.full((3, 3), math.nan), math.nan, math.nan, math.nan)
+
+
+def joint_variances(rig: Rig) -> Array:
+    """Return what is not known of each shaft at rest (3,) [rad^2] although its play is modelled."""
+    return np.array(
+        [
+            (_PLAY_DOUBT * 0.5 * math.hypot(servo.dead_band_rad, servo.backlash_rad)) ** 2
+            + servo.pulse_step_rad**2 / 12.0
+            for servo in (joint.servo for _, joint in rig.joints.items())
+        ]
+    )
+
+
+def target_position(
+    estimate: TargetEstimate, rig: Rig, shaft_variances: Array, offset: VergenceOffset | None = None
+) -> TargetPosition:
+    """Return the target's position from the filter's estimate and the shafts' variances (3,) [rad^2].
+
+    With an `offset` the visual encoder's knowledge stands in for what is not known of the pans.
+    """
+    left, right, tilt = shaft_variances
+    if offset is not None:
+        scale = offset.variance / max(left + right, 1e-12)
+        left, right = left * scale, right * scale
+        angles = estimate.angles_rad + np.array([0.0, offset.offset_rad, 0.0])
+        estimate = replace(estimate, angles_rad=angles)
+    covariance = _SHARED_NOISE * estimate.covariance
+    covariance[0, 0] += 0.25 * (left + right)
+    covariance[1, 1] += left + right
+    covariance[0, 1] += 0.5 * (right - left)
+    covariance[1, 0] += 0.5 * (right - left)
+    covariance[2, 2] += tilt
+    sigma = math.sqrt(covariance[1, 1])
+    near = estimate.vergence_rad + _TO_95_PERCENT * sigma
+    far = estimate.vergence_rad - _TO_95_PERCENT * sigma
+    low = _distance(estimate, near, rig.baseline_m)
+    high = _distance(estimate, far, rig.baseline_m)
+    try:
+        point = point_at(estimate.version_rad, estimate.vergence_rad, estimate.tilt_rad, rig.baseline_m)
+        jacobian = _jacobian(estimate, rig.baseline_m)
+    except GeometryError:
+        return TargetPosition(UNKNOWN.point_m, UNKNOWN.covariance_m2, math.inf, low, high)
+    return TargetPosition(point, jacobian @ covariance @ jacobian.T, float(np.linalg.norm(point)), low, high)
+
+
+def _distance(estimate: TargetEstimate, vergence_rad: float, baseline_m: float) -> float:
+    try:
+        return float(np.linalg.norm(point_at(estimate.version_rad, vergence_rad, estimate.tilt_rad, baseline_m)))
+    except GeometryError:
+        return math.inf
+
+
+def _jacobian(estimate: TargetEstimate, baseline_m: float) -> Array:
+    """Return d point / d (version, vergence, tilt), (3, 3) [m/rad]."""
+    step = min(1e-5, 0.1 * abs(estimate.vergence_rad))
+
+    def displaced(offset: Array) -> Array:
+        version, vergence, tilt = (float(angle) for angle in estimate.angles_rad + offset)
+        return point_at(version, vergence, tilt, baseline_m)
+
+    return np.column_stack([(displaced(row) - displaced(-row)) / (2.0 * step) for row in step * np.eye(3)])

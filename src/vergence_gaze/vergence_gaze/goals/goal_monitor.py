@@ -1,0 +1,112 @@
+"""The goal in hand: since when, what stands against it, and how it ends."""
+
+import itertools
+import math
+from dataclasses import dataclass
+
+from vergence_gaze.goals.goal import Goal, Outcome, Result
+from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.phases import Phase
+
+_LIMITED_S = 0.5
+_LOST_S = 2.5
+_DISAGREED_S = 1.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a goal's end depends on, at one cycle. `pose_reached` is None unless the goal is a pose."""
+
+    now_s: float
+    verged: bool
+    judged: str
+    note: str
+    phase: Phase
+    in_phase_s: float
+    image_s: float
+    beyond_limits: bool
+    disagreement: bool
+    by_class: bool
+    pose_reached: bool | None
+
+
+class GoalWatch:
+    """Numbers goals, holds the one in hand, and collects outcomes until they are taken."""
+
+    def __init__(self) -> None:
+        self._ids = itertools.count(1)
+        self._outcomes: list[Outcome] = []
+        self._goal_id: int | None = None
+        self._since_s = self._limit_s = math.nan
+        self._limited_since_s = self._disagreed_since_s = math.nan
+
+    @property
+    def goal_id(self) -> int | None:
+        """The goal in hand, None if there is none."""
+        return self._goal_id
+
+    def number(self) -> int:
+        """Return the id of a new goal."""
+        return next(self._ids)
+
+    def refuse(self, goal_id: int, result: Result, reason: str) -> None:
+        """End a goal that was never begun."""
+        self._outcomes.append(Outcome(goal_id, result, reason, 0.0))
+
+    def begin(self, goal_id: int, goal: Goal, now_s: float, parameters: GazeParameters) -> None:
+        """Take a goal in hand."""
+        self._goal_id, self._since_s = goal_id, now_s
+        self._limit_s = goal.time_limit_s or parameters.time_limit_s
+        self._limited_since_s = self._disagreed_since_s = math.nan
+
+    def end(self, result: Result, reason: str, now_s: float) -> None:
+        """End the goal in hand, if there is one."""
+        if self._goal_id is not None:
+            self._outcomes.append(Outcome(self._goal_id, result, reason, now_s - self._since_s))
+            self._goal_id = None
+
+    def take_outcomes(self) -> tuple[Outcome, ...]:
+        """Return the outcomes since the last call."""
+        outcomes, self._outcomes = tuple(self._outcomes), []
+        return outcomes
+
+    def watch(self, p: Progress, parameters: GazeParameters) -> Result | None:
+        """End the goal in hand if it is reached or can no longer be; returns how."""
+        if self._goal_id is None:
+            return None
+        self._limited_since_s = _since(self._limited_since_s, p.beyond_limits, p.now_s)
+        self._disagreed_since_s = _since(self._disagreed_since_s, p.disagreement, p.now_s)
+        ending = self._pose_ending(p) if p.pose_reached is not None else self._target_ending(p, parameters)
+        if ending is None:
+            return None
+        self.end(*ending, p.now_s)
+        return ending[0]
+
+    def _pose_ending(self, p: Progress) -> tuple[Result, str] | None:
+        if p.pose_reached:
+            return Result.VERGED, "the angles are reached"
+        if p.now_s - self._since_s > self._limit_s:
+            return Result.TIMED_OUT, "the joints did not arrive"
+        return None
+
+    def _target_ending(self, p: Progress, parameters: GazeParameters) -> tuple[Result, str] | None:
+        if p.verged:
+            return Result.VERGED, p.judged
+        if p.now_s - self._limited_since_s > _LIMITED_S:
+            return Result.LIMITS, "the target is beyond the joints' limits"
+        if p.now_s - self._disagreed_since_s > _DISAGREED_S:
+            return Result.DISAGREEMENT, "estimators disagree by more than the object's depth explains"
+        if p.now_s - max(p.image_s, self._since_s) > parameters.no_images_s:
+            return Result.NO_IMAGES, "no image results arrive"
+        if p.now_s - self._since_s > self._limit_s:
+            lost = p.phase in (Phase.LOST, Phase.SEARCH)
+            return (Result.LOST if lost else Result.TIMED_OUT), p.note or p.judged
+        if p.phase is Phase.SEARCH and not p.by_class and p.in_phase_s > _LOST_S:
+            return Result.LOST, "the target was not found again"
+        return None
+
+
+def _since(since_s: float, holds: bool, now_s: float) -> float:
+    if not holds:
+        return math.nan
+    return now_s if math.isnan(since_s) else since_s

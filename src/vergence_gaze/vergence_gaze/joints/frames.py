@@ -1,0 +1,43 @@
+"""Points of the camera frames in rig_base, with the joint angles at their own stamp."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from vergence_gaze.joints.joint_history import JointHistory
+from vergence_rig.geometry import eye_position, rotation_rig_from_eye, rotation_rig_from_optical
+
+FRAMES = (
+    "rig_base",
+    "left_camera",
+    "right_camera",
+    "left_camera_optical_frame",
+    "right_camera_optical_frame",
+)
+"""Frames that are known without tf2. An empty name is rig_base."""
+
+
+class FrameError(ValueError):
+    """A frame that is not known here."""
+
+
+def point_in_rig(
+    point_m: Any, frame: str, stamp_s: float, history: JointHistory, baseline_m: float
+) -> tuple[float, float, float]:
+    """Return a point (3,) of `frame` at `stamp_s` (NaN: now) in rig_base [m]. Raises FrameError."""
+    name = frame.rsplit("/", 1)[-1] or "rig_base"
+    if name not in FRAMES:
+        raise FrameError(f"frame is {frame!r}: allowed is one of {', '.join(FRAMES)}; others need tf2_ros")
+    if name == "rig_base":
+        x, y, z = point_m
+        return float(x), float(y), float(z)
+    if not history.known:
+        raise FrameError(f"frame is {frame!r}: allowed is rig_base until joint_states arrive")
+    known = math.isfinite(stamp_s) and history.covers(stamp_s)
+    pan_left, pan_right, tilt = history.shaft_at(stamp_s) if known else history.shaft_rad
+    left = name.startswith("left")
+    turn = rotation_rig_from_optical if name.endswith("optical_frame") else rotation_rig_from_eye
+    x, y, z = turn(pan_left if left else pan_right, tilt) @ np.asarray(point_m, dtype=float)
+    y += eye_position(left, baseline_m)[1]
+    return float(x), float(y), float(z)

@@ -1,0 +1,263 @@
+"""The controller's messages to and from its plain values."""
+
+import math
+from array import array
+
+import numpy as np
+import numpy.typing as npt
+from geometry_msgs.msg import Point, PointStamped, Transform
+from sensor_msgs.msg import CameraInfo, JointState
+from std_msgs.msg import Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from vergence_common.stamps import to_seconds, to_stamp
+from vergence_gaze.control.report import GazeReport
+from vergence_gaze.estimation.observations import (
+    BoxSighting,
+    EdgeJudgement,
+    EyeRotationReading,
+    FoveaDisparity,
+    JointReport,
+    JointResolution,
+    TrackSighting,
+)
+from vergence_gaze.goals.goal import Goal, GoalKind, Outcome
+from vergence_msgs.action import LookAt
+from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack, VergenceError
+from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import eye_direction, eye_position
+from vergence_rig.rig import JOINT_NAMES
+
+Array = npt.NDArray[np.float64]
+
+BASE_FRAME = "rig_base"
+JUDGE_WINDOWS_PX = (50, 150)
+_RAY_M = 2.0
+
+
+def joint_report(message: JointState) -> JointReport:
+    """Return the positions by name; a message with fewer positions than names gives those there are."""
+    return JointReport(to_seconds(message.header.stamp), dict(zip(message.name, message.position, strict=False)))
+
+
+def joint_resolution(message: JointState) -> JointResolution:
+    """Return the smallest step of each joint, which servo_node publishes as positions."""
+    return JointResolution(to_seconds(message.header.stamp), dict(zip(message.name, message.position, strict=False)))
+
+
+def fovea_disparity(message: VergenceError, focal_px: float) -> FoveaDisparity:
+    """Return the signed error; `focal_px` turns its standard deviation into radians."""
+    return FoveaDisparity(
+        stamp_s=to_seconds(message.header.stamp),
+        skew_s=message.pair_skew_s,
+        horizontal_rad=message.horizontal_rad,
+        sigma_rad=message.sigma_px / focal_px,
+        confidence=message.confidence,
+        usable=message.status == VergenceError.STATUS_OK and math.isfinite(message.horizontal_rad),
+        reason=message.reason,
+    )
+
+
+def track_sighting(message: TargetTrack, left_camera: CameraModel) -> TrackSighting:
+    """Return the track in normalised coordinates."""
+    found = message.status in (TargetTrack.STATUS_OK, TargetTrack.STATUS_OCCLUDED)
+    x, y = left_camera.undistort([[message.left_x_px, message.left_y_px]])[0] if found else (math.nan, math.nan)
+    both = message.status == TargetTrack.STATUS_OK
+    return TrackSighting(
+        stamp_s=to_seconds(message.header.stamp),
+        skew_s=message.pair_skew_s,
+        track_id=message.track_id,
+        lock_stamp_s=to_seconds(message.lock_stamp),
+        left_x=float(x),
+        left_y=float(y),
+        disparity_rad=message.disparity_rad if both else math.nan,
+        sigma_rad=message.sigma_px / left_camera.fx_px,
+        extent_rad=message.extent_width_px / left_camera.fx_px,
+        usable=bool(found and math.isfinite(x) and math.isfinite(y)),
+        reason=message.reason,
+    )
+
+
+def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
+    """Return the detected target."""
+    seen = (
+        BoxVergence.STATUS_OK,
+        BoxVergence.STATUS_LEFT_ONLY,
+        BoxVergence.STATUS_RIGHT_ONLY,
+        BoxVergence.STATUS_CUT,
+        BoxVergence.STATUS_OCCLUDED,
+    )
+    return BoxSighting(
+        stamp_s=to_seconds(message.header.stamp),
+        skew_s=message.pair_skew_s,
+        left_azimuth_rad=message.left_azimuth_rad,
+        left_elevation_rad=message.left_elevation_rad,
+        right_azimuth_rad=message.right_azimuth_rad,
+        right_elevation_rad=message.right_elevation_rad,
+        surface_disparity_rad=math.atan(message.refined_horizontal_px / focal_px),
+        sigma_rad=message.sigma_px / focal_px,
+        extent_rad=(message.left.x_max_px - message.left.x_min_px) / focal_px,
+        class_name=message.class_name,
+        usable=message.status in seen
+        and (math.isfinite(message.left_azimuth_rad) or math.isfinite(message.right_azimuth_rad)),
+        reason=message.reason,
+        whole=message.status not in (BoxVergence.STATUS_CUT, BoxVergence.STATUS_OCCLUDED),
+    )
+
+
+def edge_judgement(message: EdgeVergence) -> EdgeJudgement:
+    """Return the best contrast of the small windows, which judge best, and the raw metric of the same window."""
+    best = (math.nan, math.nan)
+    for size, contrast, left, right in zip(
+        message.windows_px, message.contrast, message.left_to_right_px, message.right_to_left_px, strict=False
+    ):
+        if JUDGE_WINDOWS_PX[0] <= size <= JUDGE_WINDOWS_PX[1] and not contrast >= best[0]:
+            best = (contrast, 0.5 * (left + right)) if math.isfinite(contrast) else best
+    return EdgeJudgement(to_seconds(message.header.stamp), best[0], best[1], message.verged)
+
+
+def eye_rotation(message: EyeRotation) -> EyeRotationReading:
+    """Return what the visual encoder read."""
+    return EyeRotationReading(
+        stamp_s=to_seconds(message.header.stamp),
+        skew_s=message.pair_skew_s,
+        vergence_rad=message.vergence_rad,
+        sigma_rad=message.sigma_rad,
+        usable=message.status == EyeRotation.STATUS_OK,
+        reason=message.reason,
+    )
+
+
+def camera_model(message: CameraInfo) -> CameraModel:
+    """Return the camera of a CameraInfo; raises CameraError if it is not calibrated."""
+    return CameraModel.from_camera_info_values(
+        message.width, message.height, message.k, message.d, message.distortion_model
+    )
+
+
+def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: CameraModel, right: CameraModel) -> Goal:
+    """Return a LookAt goal; `point_m` is its point, already in rig_base. Raises ValueError for an unknown kind."""
+    stamp_s = to_seconds(request.header.stamp)
+    left_xy = left.undistort([[request.left_x_px, request.left_y_px]])[0]
+    right_xy = right.undistort([[request.right_x_px, request.right_y_px]])[0]
+    return Goal(
+        kind=GoalKind(request.kind),
+        point_m=point_m,
+        left_eye=request.eye == LookAt.Goal.EYE_LEFT,
+        left_xy=(float(left_xy[0]), float(left_xy[1])),
+        right_xy=(float(right_xy[0]), float(right_xy[1])),
+        depth_m=request.depth_m if request.depth_m > 0 else math.nan,
+        version_rad=request.version_rad,
+        vergence_rad=request.vergence_rad,
+        tilt_rad=request.tilt_rad,
+        class_name=request.class_name,
+        stamp_s=stamp_s if stamp_s > 0 else math.nan,
+        time_limit_s=request.time_limit_s,
+    )
+
+
+def look_at_result(outcome: Outcome, report: GazeReport | None, stamp_s: float) -> LookAt.Result:
+    """Return the action's result."""
+    result = LookAt.Result(result=int(outcome.result), reason=outcome.reason, time_s=outcome.time_s)
+    if report is not None:
+        result.fixation_point = point_stamped(report.fixation_m, stamp_s)
+        result.vergence_rad = report.vergence_rad
+    return result
+
+
+def look_at_feedback(report: GazeReport) -> LookAt.Feedback:
+    """Return the action's feedback."""
+    version, vergence, tilt = (math.degrees(residual) for residual in report.residual_rad)
+    return LookAt.Feedback(
+        phase_name=report.phase.name.lower(),
+        version_residual_deg=version,
+        vergence_residual_deg=vergence,
+        tilt_residual_deg=tilt,
+        residual_px=report.residual_px,
+        contrast=report.contrast,
+    )
+
+
+def joint_command(joints_rad: Array, stamp_s: float) -> JointState:
+    """Return the command by joint name."""
+    header = Header(stamp=to_stamp(stamp_s))
+    return JointState(header=header, name=list(JOINT_NAMES), position=array("d", joints_rad.tolist()))
+
+
+def gaze_state(report: GazeReport) -> GazeState:
+    """Return the state message."""
+    version, vergence, tilt = report.residual_rad
+    return GazeState(
+        header=Header(stamp=to_stamp(report.stamp_s), frame_id=BASE_FRAME),
+        phase=int(report.phase),
+        phase_name=report.phase.name.lower(),
+        reason=report.reason,
+        law=report.law,
+        mode=report.mode,
+        verged=report.verged,
+        target_moving=report.target_moving,
+        version_rad=report.version_rad,
+        vergence_rad=report.vergence_rad,
+        tilt_rad=report.tilt_rad,
+        version_residual_rad=version,
+        vergence_residual_rad=vergence,
+        tilt_residual_rad=tilt,
+        residual_px=report.residual_px,
+        contrast=report.contrast,
+        target=point(report.target.point_m),
+        target_covariance=report.target.covariance_m2.reshape(-1),
+        distance_m=report.target.distance_m,
+        distance_low_m=report.target.low_m,
+        distance_high_m=report.target.high_m,
+        miss_distance_m=report.miss_distance_m,
+    )
+
+
+def point(point_m: Array) -> Point:
+    """Return a (3,) point."""
+    x, y, z = (float(value) for value in point_m)
+    return Point(x=x, y=y, z=z)
+
+
+def point_stamped(point_m: Array, stamp_s: float) -> PointStamped:
+    """Return a (3,) point in rig_base."""
+    return PointStamped(header=Header(stamp=to_stamp(stamp_s), frame_id=BASE_FRAME), point=point(point_m))
+
+
+def gaze_markers(joints_rad: Array, fixation_m: Array, baseline_m: float, stamp_s: float) -> MarkerArray:
+    """Return the two gaze rays, to the fixation point where there is one, and a ball on it, for RViz."""
+    header = Header(stamp=to_stamp(stamp_s), frame_id=BASE_FRAME)
+    meets = bool(np.isfinite(fixation_m).all())
+    markers = []
+    for number, (left, pan) in enumerate(((True, joints_rad[0]), (False, joints_rad[1]))):
+        ray = Marker(header=header, ns="gaze", id=number, type=Marker.ARROW, action=Marker.ADD)
+        origin = eye_position(left, baseline_m)
+        length = float(np.linalg.norm(fixation_m - origin)) if meets else _RAY_M
+        ray.points = [point(origin), point(origin + min(length, _RAY_M) * eye_direction(pan, joints_rad[2]))]
+        ray.scale.x, ray.scale.y, ray.scale.z = 0.004, 0.01, 0.02
+        ray.pose.orientation.w = 1.0
+        ray.color.r, ray.color.g, ray.color.b, ray.color.a = (0.1, 0.5, 1.0, 0.9) if left else (1.0, 0.4, 0.1, 0.9)
+        markers.append(ray)
+    ball = Marker(header=header, ns="gaze", id=2, type=Marker.SPHERE)
+    ball.action = Marker.ADD if meets else Marker.DELETE
+    if meets:
+        ball.pose.position = point(fixation_m)
+    ball.pose.orientation.w = 1.0
+    ball.scale.x = ball.scale.y = ball.scale.z = 0.02
+    ball.color.g, ball.color.a = 0.9, 0.9
+    return MarkerArray(markers=[*markers, ball])
+
+
+def transformed_point(transform: Transform, point_in: Point) -> tuple[float, float, float]:
+    """Return a point moved by a geometry_msgs/Transform."""
+    w, x, y, z = (transform.rotation.w, transform.rotation.x, transform.rotation.y, transform.rotation.z)
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    offset = (transform.translation.x, transform.translation.y, transform.translation.z)
+    moved = rotation @ (point_in.x, point_in.y, point_in.z) + offset
+    return float(moved[0]), float(moved[1]), float(moved[2])

@@ -1,0 +1,270 @@
+"""A head without hardware, pixels or physics: servo plants, a point as target, and sightings with noise and latency.
+
+It ships beside the controller as its fake: tests and benchmarks run against it, faster than real time. What it sees
+comes from its own true shafts, by the definition of the axes; only the servo plant is shared with the rest.
+"""
+
+import heapq
+import itertools
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_gaze.estimation.observations import (
+    BoxSighting,
+    EdgeJudgement,
+    FoveaDisparity,
+    JointReport,
+    Observation,
+    TrackSighting,
+)
+from vergence_rig.rig import JOINT_NAMES, Rig
+from vergence_rig.servo import ServoPlant, ServoSpec
+
+Array = npt.NDArray[np.float64]
+
+TICK_S = 1.0 / 300.0
+"""Everything happens on this raster: 30 Hz images every 10 ticks, 50 Hz joint reports every 6."""
+
+
+@dataclass(frozen=True)
+class Seeing:
+    """How the head sees. Latency is from exposure to the result's arrival; noise and offsets are of the image."""
+
+    latency_s: float = 0.06
+    frame_ticks: int = 10
+    skew_ticks: int = 2
+    noise_px: float = 0.3
+    right_roll_rad: float = 0.0
+    right_vertical_px: float = 0.0
+    stamp_error_s: float = 0.0
+    track: bool = True
+    fovea: bool = True
+    boxes: bool = False
+    box_frame_ticks: int = 20
+    box_latency_s: float = 0.11
+    box_noise_px: float = 1.5
+    box_miss_share: float = 0.05
+    field_margin_px: float = 15.0
+    extent_rad: float = 0.1
+
+
+@dataclass
+class FakeHead:
+    """Rig, true servos, target and eyes. `visible(t)` hides the target; `target(t)` gives it (3,) in rig_base [m].
+
+    `clutter(t)` is a point that lies at the fovea while the target is hidden (an occluder), or None. `mistaken` says,
+    by estimator ("fovea", "track", "box"), what it takes for the target at `t`, or None while it is right. `servos` are
+    the servos as they really are, by joint, where they differ from what the rig's description says. Time begins at
+    `begin_s`.
+    """
+
+    rig: Rig
+    target: Callable[[float], Array]
+    seeing: Seeing = field(default_factory=Seeing)
+    seed: int = 0
+    start_rad: Mapping[str, float] = field(default_factory=dict)
+    visible: Callable[[float], bool] = lambda time_s: True
+    clutter: Callable[[float], Array] | None = None
+    mistaken: Mapping[str, Callable[[float], Array | None]] = field(default_factory=dict)
+    servos: Mapping[str, ServoSpec] = field(default_factory=dict)
+    begin_s: float = 0.0
+    report_ticks: int = 6
+
+    def __post_init__(self) -> None:
+        self._random = np.random.default_rng(self.seed)
+        self._ticks = 0
+        self._order = itertools.count()
+        self._arrivals: list[tuple[float, int, Observation]] = []
+        self._plants: dict[str, ServoPlant] = {}
+        self._models: dict[str, ServoPlant] = {}
+        for name, joint in self.rig.joints.items():
+            servo, start = self.servos.get(name, joint.servo), self.start_rad.get(name, 0.0)
+            # At rest a shaft lies anywhere in its play.
+            half = 0.5 * (servo.dead_band_rad + servo.backlash_rad)
+            self._plants[name] = ServoPlant(servo, start + self._random.uniform(-half, half), self.begin_s)
+            self._models[name] = ServoPlant(joint.servo, start, self.begin_s)
+        self.reported_rad = {name: self.start_rad.get(name, 0.0) for name in JOINT_NAMES}
+        self._track_id, self._lock_s = 1, self.begin_s + 0.1
+        self._pending_frame: tuple[float, Array, bool] | None = None
+        self._left_pixel = np.full(2, math.nan)
+        self._lately: deque[Array] = deque(maxlen=22)
+        self._turned = False
+        self._slow_ticks = 0
+
+    @property
+    def time_s(self) -> float:
+        """The present."""
+        return self.begin_s + self._ticks * TICK_S
+
+    @property
+    def true_rad(self) -> Array:
+        """The true joint angles (3,), pan_left, pan_right, tilt."""
+        return np.array([self._plants[name].true_rad for name in JOINT_NAMES])
+
+    def command(self, joints_rad: Array) -> None:
+        """Command the joints (3,)."""
+        for name, angle in zip(JOINT_NAMES, joints_rad, strict=True):
+            self._plants[name].command(float(angle), self.time_s)
+            self._models[name].command(float(angle), self.time_s)
+
+    def true_errors_rad(self) -> Array:
+        """Return (version, vergence, tilt) to the target minus the true ones (3,)."""
+        x, y, z = self.target(self.time_s)
+        forward, half = math.hypot(x, z), 0.5 * self.rig.baseline_m
+        left, right = math.atan2(y - half, forward), math.atan2(y + half, forward)
+        true = self.true_rad
+        return np.array(
+            [
+                0.5 * (left + right) - 0.5 * (true[0] + true[1]),
+                (right - left) - (true[1] - true[0]),
+                math.atan2(-z, x) - true[2],
+            ]
+        )
+
+    def advance(self) -> list[Observation]:
+        """Move on by one tick and return the observations that arrived in it."""
+        self._ticks += 1
+        now_s = self.time_s
+        for plant in (*self._plants.values(), *self._models.values()):
+            plant.step(now_s)
+        self._note_saccades()
+        if self._ticks % self.report_ticks == 0:
+            for name in JOINT_NAMES:
+                self.reported_rad[name] = self._models[name].modelled_rad
+            self._send(now_s + 0.002, JointReport(now_s, dict(self.reported_rad)))
+        phase = self._ticks % self.seeing.frame_ticks
+        if phase == 0:
+            self._pending_frame = (now_s, self._project(left=True), self.visible(now_s))
+        if phase == self.seeing.skew_ticks and self._pending_frame is not None:
+            self._see_pair(*self._pending_frame, now_s)
+            self._pending_frame = None
+        arrived = []
+        while self._arrivals and self._arrivals[0][0] <= now_s:
+            arrived.append(heapq.heappop(self._arrivals)[2])
+        return arrived
+
+    def project(self, point_m: Array, left: bool) -> Array:
+        """Return normalised image coordinates (2,), x right, y down, of a point; NaN behind the eye."""
+        pan, tilt = self.true_rad[0 if left else 1], self.true_rad[2]
+        x, y, z = point_m
+        y = y - (0.5 if left else -0.5) * self.rig.baseline_m
+        forward, up = math.cos(tilt) * x - math.sin(tilt) * z, math.sin(tilt) * x + math.cos(tilt) * z
+        ahead, aside = math.cos(pan) * forward + math.sin(pan) * y, -math.sin(pan) * forward + math.cos(pan) * y
+        return np.array([-aside / ahead, -up / ahead]) if ahead > 1e-6 else np.full(2, math.nan)
+
+    def _project(self, left: bool) -> Array:
+        return self.project(self.target(self.time_s), left)
+
+    def _note_saccades(self) -> None:
+        """As the class-free tracker does: a new lock once the eyes rest after a turn of 2.5 degrees in 70 ms."""
+        speed = max(abs(plant.velocity_rad_s) for plant in self._plants.values())
+        self._slow_ticks = self._slow_ticks + 1 if speed < 0.35 else 0
+        self._lately.append(self.true_rad)
+        self._turned |= bool(np.abs(self._lately[-1] - self._lately[0]).max() > math.radians(2.5))
+        if self._turned and self._slow_ticks == 9:
+            self._track_id, self._lock_s, self._turned = self._track_id + 1, self.time_s, False
+            self._lately.clear()
+
+    def _see_pair(self, left_s: float, left_xy: Array, visible: bool, right_s: float) -> None:
+        seeing, focal = self.seeing, self.rig.left_camera.fx_px
+        right_xy = self._misaligned(self._project(left=False))
+        noise = self._random.normal(0.0, seeing.noise_px / focal, 4)
+        in_left = visible and self._in_view(left_xy)
+        in_right = visible and self._in_view(right_xy)
+        left_xy, right_xy = left_xy + noise[:2], right_xy + noise[2:]
+        arrival_s = right_s + seeing.latency_s
+        left_s, right_s = left_s + seeing.stamp_error_s, right_s + seeing.stamp_error_s
+        disparity = math.atan(left_xy[0]) - math.atan(right_xy[0]) if in_left and in_right else math.nan
+        sigma = 1.5 * seeing.noise_px / focal
+        skew_s = right_s - left_s
+        if seeing.track:
+            locked = left_s > self._lock_s
+            usable = in_left and locked
+            self._send(
+                arrival_s,
+                TrackSighting(
+                    left_s,
+                    skew_s,
+                    self._track_id,
+                    self._lock_s,
+                    float(left_xy[0]),
+                    float(left_xy[1]),
+                    disparity + self._mistake_rad("track", left_s, disparity),
+                    sigma,
+                    seeing.extent_rad,
+                    usable,
+                ),
+            )
+        on_fovea = in_left and math.hypot(*left_xy) < 0.05
+        at_fovea = disparity + self._mistake_rad("fovea", left_s, disparity)
+        if seeing.fovea:
+            value = at_fovea if on_fovea else math.nan
+            if not visible and self.clutter is not None:
+                left, right = self.project(self.clutter(left_s), True), self.project(self.clutter(left_s), False)
+                value = math.atan(left[0]) - math.atan(right[0])
+            usable = math.isfinite(value) and abs(value) < math.atan(150.0 / focal)
+            self._send(arrival_s, FoveaDisparity(left_s, skew_s, value, sigma, 0.9 if usable else 0.0, usable))
+        pixels = abs(at_fovea) * focal if on_fovea and in_right else math.inf
+        contrast = 0.3 + 0.68 * (1.0 - math.exp(-((pixels / 3.6) ** 1.2))) + self._random.normal(0.0, 0.03)
+        self._send(arrival_s, EdgeJudgement(left_s, contrast, min(pixels, 8.0) + 1.0, False))
+        if seeing.boxes and self._ticks % seeing.box_frame_ticks < seeing.frame_ticks:
+            self._see_boxes(left_s, skew_s, left_xy if in_left else None, right_xy if in_right else None)
+
+    def _mistake_rad(self, estimator: str, time_s: float, disparity_rad: float) -> float:
+        """Return how far an estimator's disparity is off because it is of something else; 0 if it is not."""
+        other = self.mistaken[estimator](time_s) if estimator in self.mistaken else None
+        if other is None or not math.isfinite(disparity_rad):
+            return 0.0
+        left, right = self.project(other, left=True), self.project(other, left=False)
+        return math.atan(left[0]) - math.atan(right[0]) - disparity_rad
+
+    def _see_boxes(self, left_s: float, skew_s: float, left_xy: Array | None, right_xy: Array | None) -> None:
+        seeing, focal = self.seeing, self.rig.left_camera.fx_px
+        elsewhere = self.mistaken["box"](left_s) if "box" in self.mistaken else None
+        if elsewhere is not None:
+            left_xy, right_xy = self.project(elsewhere, left=True), self.project(elsewhere, left=False)
+        if self._random.random() < seeing.box_miss_share:
+            left_xy = right_xy = None
+        angles = np.full(4, math.nan)
+        for i, xy in enumerate((left_xy, right_xy)):
+            if xy is not None:
+                blurred = xy + self._random.normal(0.0, seeing.box_noise_px / focal, 2)
+                angles[2 * i : 2 * i + 2] = np.arctan(blurred)
+        usable = left_xy is not None or right_xy is not None
+        self._send(
+            left_s + skew_s - seeing.stamp_error_s + seeing.box_latency_s,
+            BoxSighting(
+                stamp_s=left_s,
+                skew_s=skew_s,
+                left_azimuth_rad=float(angles[0]),
+                left_elevation_rad=float(angles[1]),
+                right_azimuth_rad=float(angles[2]),
+                right_elevation_rad=float(angles[3]),
+                surface_disparity_rad=math.nan,
+                sigma_rad=seeing.box_noise_px / focal,
+                extent_rad=seeing.extent_rad,
+                class_name="target" if usable else "",
+                usable=usable,
+            ),
+        )
+
+    def _misaligned(self, xy: Array) -> Array:
+        sine, cosine = math.sin(self.seeing.right_roll_rad), math.cos(self.seeing.right_roll_rad)
+        offset = self.seeing.right_vertical_px / self.rig.right_camera.fy_px
+        return np.array([cosine * xy[0] - sine * xy[1], sine * xy[0] + cosine * xy[1] - offset])
+
+    def _in_view(self, xy: Array) -> bool:
+        camera = self.rig.left_camera
+        margin = self.seeing.field_margin_px
+        return bool(
+            abs(xy[0]) * camera.fx_px < 0.5 * camera.width_px - margin
+            and abs(xy[1]) * camera.fy_px < 0.5 * camera.height_px - margin
+        )
+
+    def _send(self, arrival_s: float, observation: Observation) -> None:
+        heapq.heappush(self._arrivals, (arrival_s, next(self._order), observation))

@@ -1,0 +1,1 @@
+"""Vertical offset and roll between the eyes, measured and taken out."""

@@ -1,0 +1,1 @@
+"""Metric I: edges, their distances, chance level and contrast."""

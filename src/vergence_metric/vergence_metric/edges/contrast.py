@@ -1,0 +1,80 @@
+"""Contrast of the edge metric with chance: about 1 where two images are unrelated, well below 1 at vergence.
+
+For edge pixels of direction bin k let d_k be the distance to the other image's nearest edge pixel of that bin, cut off
+at a few pixels. With n_k edge pixels of bin k in the window,
+
+    contrast = mean of d_k over the window's edge pixels / (sum of n_k * mean of d_k over all its pixels / sum of n_k).
+
+The denominator is what the numerator would be at any unrelated alignment of the same two edge images, so that density,
+texture and exposure cancel. It judges, it does not guide: it is flat a few pixels away from vergence.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence_metric.edges.oriented_edges import OrientedField
+
+_LATTICE = 24  # points along a window's side that stand for all its pixels
+
+
+@dataclass(frozen=True)
+class Contrasts:
+    """Contrast in each window, (n,) float64, windows sorted by size; NaN where there is nothing to judge."""
+
+    left_to_right: NDArray[np.float64]
+    right_to_left: NDArray[np.float64]
+
+    @property
+    def both(self) -> NDArray[np.float64]:
+        """Mean of the two directions."""
+        return (self.left_to_right + self.right_to_left) / 2.0
+
+
+def contrasts(field: OrientedField, truncation_px: int) -> Contrasts:
+    """Return the contrast in every window of `field`, distances cut off at `truncation_px` (at most the field's).
+
+    NaN in a window where either image has no edge pixel.
+    """
+    counts = [_counts(field, image) for image in (0, 1)]
+    judgeable = (counts[0].sum(axis=1) > 0) & (counts[1].sum(axis=1) > 0)
+    ratios = []
+    for direction in (0, 1):
+        rings = field.images[direction].ring
+        distance = field.distances_px(direction, truncation_px)
+        total = np.bincount(rings, weights=distance, minlength=len(field.windows)).cumsum()
+        everywhere = field.mean_distances_px(1 - direction, truncation_px, _LATTICE)
+        chance = (counts[direction] * everywhere).sum(axis=1)
+        # chance is 0 only where every pixel is an edge pixel: nothing to tell apart
+        ratios.append(np.where(judgeable & (chance > 0.0), total / np.where(chance > 0.0, chance, 1.0), np.nan))
+    return Contrasts(*ratios)
+
+
+def foveal_contrast(field: OrientedField, truncation_px: int, sigma_px: float) -> float:
+    """Return the contrast of what the eyes are turned to: edge pixels weigh less with their distance from the centre.
+
+    A window with a soft border: a target that fills only the middle of the smallest window still decides. The weight is
+    a Gaussian; chance is that of the smallest window which holds two standard deviations of it. Mean of both
+    directions, NaN where there is nothing to judge.
+    """
+    wide_enough = [i for i, window in enumerate(field.windows) if window.size_px >= 4.0 * sigma_px]
+    window = wide_enough[0] if wide_enough else len(field.windows) - 1
+    ratios = []
+    for direction in (0, 1):
+        edges, weight = field.images[direction], field.fovea_weights(direction, sigma_px)
+        inside = edges.ring <= window
+        of_bin = np.bincount(edges.bin[inside], weights=weight[inside], minlength=field.bins)
+        everywhere = field.mean_distances_px(1 - direction, truncation_px, _LATTICE)[window]
+        figure = float(weight[inside] @ field.distances_px(direction, truncation_px)[inside])
+        chance = float(of_bin @ everywhere)
+        ratios.append(figure / chance if chance > 0.0 else math.nan)
+    return (ratios[0] + ratios[1]) / 2.0
+
+
+def _counts(field: OrientedField, image: int) -> NDArray[np.int64]:
+    """Return the number of edge pixels of each bin in each window, (windows, bins)."""
+    edges, n = field.images[image], len(field.windows)
+    cells = np.bincount(edges.ring * field.bins + edges.bin, minlength=n * field.bins)
+    return cells.reshape(n, field.bins).cumsum(axis=0)

@@ -1,0 +1,236 @@
+"""Edge pixels by gradient direction, and truncated distances to those of one direction.
+
+An edge pixel that finds a neighbour has found its own surface only if that neighbour's edge runs the same way. Edge
+pixels are therefore sorted into bins by the direction of their gradient, and distances are taken within a bin and cut
+off where a neighbour is too far to be the same edge.
+
+Up to eight bins share the bits of one byte a pixel. With distances cut off at a few pixels there are few different
+ones: plane i of `OrientedEdges.planes` has a bin's bit set where an edge pixel of that bin lies within the i-th one.
+Each plane is the one before with a few shifted copies of the edges laid over it, for all bins at once.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache, lru_cache, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence_metric.edges.edges import Edges
+from vergence_metric.edges.parameters import LARGEST_TRUNCATION_PX, MOST_BINS
+from vergence_metric.edges.scratch import Scratch
+from vergence_metric.edges.windows import Window
+
+Buffer = Callable[[tuple[int, ...], type[np.uint8]], NDArray[np.uint8]]
+
+
+@dataclass(frozen=True)
+class OrientedEdges:
+    """Edge pixels of one image inside the largest window, and who is near them.
+
+    `row`, `column` (n,) count from the corner of the largest window, `bin` (n,) uint8 is the direction, `ring` (n,) the
+    index of the smallest window that holds the pixel, windows sorted by size. `planes` (radii, pixels) uint8 are the
+    planes the module describes, `at` (n,) the edge pixels' places in them.
+    """
+
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    bin: NDArray[np.uint8]
+    ring: NDArray[np.int64]
+    at: NDArray[np.int64]
+    planes: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class OrientedField:
+    """Oriented edges of the left and the right image in centre windows, which are sorted by size."""
+
+    windows: tuple[Window, ...]
+    bins: int
+    truncation_px: int
+    images: tuple[OrientedEdges, OrientedEdges]
+    _known: dict[tuple[object, ...], NDArray[Any]] = field(default_factory=dict, repr=False, compare=False)
+
+    def distances_px(self, direction: int, truncation_px: int) -> NDArray[np.float32]:
+        """Return the truncated distance of each edge pixel of image `direction` to the other's of its bin, (n,)."""
+        key = ("at edges", direction, truncation_px)
+        if key not in self._known:
+            edges, planes = self.images[direction], self.images[1 - direction].planes
+            steps = radius_steps(truncation_px)
+            near = np.take(planes[: len(steps)], edges.at, axis=1)
+            near >>= edges.bin
+            near &= 1
+            self._known[key] = np.float32(truncation_px) - steps @ near.astype(np.float32)
+        return self._known[key]
+
+    def mean_distances_px(self, image: int, truncation_px: int, points_per_side: int) -> NDArray[np.float64]:
+        """Return the mean truncated distance to the edges of `image`, (windows, bins), over a lattice of pixels."""
+        key = ("everywhere", image, truncation_px, points_per_side)
+        if key not in self._known:
+            self._known[key] = self._mean_distances(image, truncation_px, points_per_side)
+        return self._known[key]
+
+    def fovea_weights(self, image: int, sigma_px: float) -> NDArray[np.float64]:
+        """Return a Gaussian weight of each edge pixel of `image` about the windows' centre, (n,)."""
+        edges, window = self.images[image], self.windows[-1]
+        return _gaussian(window.height, sigma_px)[edges.row] * _gaussian(window.width, sigma_px)[edges.column]
+
+    def _mean_distances(self, image: int, truncation_px: int, points_per_side: int) -> NDArray[np.float64]:
+        planes, places = self.images[image].planes, _lattice(self.windows, self.truncation_px, points_per_side)
+        steps = radius_steps(truncation_px).astype(np.float64)
+        near = planes[: len(steps)].take(places.index, axis=1)
+        # a bit becomes a byte of its own, so that one addition of words adds up all bins of a row's pixels
+        of_rows = np.add.reduceat(_SPREAD.take(near), places.row_starts, axis=1).view(np.uint8)
+        counts = np.add.reduceat(
+            of_rows.reshape(len(steps), -1, MOST_BINS), places.window_starts, axis=1, dtype=np.int64
+        )[..., : self.bins]
+        return truncation_px - np.tensordot(steps, counts, axes=1) / places.sizes[:, None]
+
+
+@dataclass(frozen=True)
+class _Lattice:
+    """Places in a plane of pixels that lie evenly in each window.
+
+    `row_starts` says where in `index` a row of pixels begins, `window_starts` which of the rows begins a window, and
+    `sizes` how many pixels a window has.
+    """
+
+    index: NDArray[np.intp]
+    row_starts: NDArray[np.intp]
+    window_starts: NDArray[np.intp]
+    sizes: NDArray[np.intp]
+
+
+@lru_cache(maxsize=16)
+def _lattice(windows: tuple[Window, ...], margin: int, points_per_side: int) -> _Lattice:
+    outer, rows_of, sizes, places = windows[-1], [0], [], []
+    for window in windows:
+        row, column = window.lattice(points_per_side)
+        row += window.top - outer.top + margin
+        column += window.left - outer.left + margin
+        places += list(row[:, None] * (outer.width + 2 * margin) + column)
+        rows_of.append(len(places))
+        sizes.append(row.size * column.size)
+    row_starts = np.cumsum([0, *(len(row) for row in places[:-1])])
+    return _Lattice(np.concatenate(places), row_starts, np.array(rows_of[:-1]), np.array(sizes))
+
+
+_SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").view(np.uint64).ravel()
+
+
+def oriented_field(
+    left: Edges,
+    right: Edges,
+    windows: Sequence[Window],
+    *,
+    bins: int,
+    signed: bool,
+    truncation_px: int,
+    scratch: Scratch | None = None,
+) -> OrientedField:
+    """Return the oriented edges of a pair, with distances up to `truncation_px`.
+
+    `bins` directions over 360 degrees where `signed` tells dark-to-bright from bright-to-dark, else over 180; the first
+    is centred on horizontal gradients. Neighbours may lie outside a window: unlike the paper's metric this one only
+    looks `truncation_px` far, and edges cut off by a window's border would be nothing but noise.
+    With `scratch` the memory is taken from there: the field is then good until the next one made with it.
+    """
+    if not 1 <= truncation_px <= LARGEST_TRUNCATION_PX or not 1 <= bins <= MOST_BINS:
+        raise ValueError(
+            f"truncation of {truncation_px} px, {bins} bins: they must be from 1 to {LARGEST_TRUNCATION_PX} px and "
+            f"from 1 to {MOST_BINS}"
+        )
+    ordered = tuple(sorted(windows, key=lambda window: window.size_px))
+    scratch = scratch or Scratch()
+    images = [
+        _oriented(edges, ordered, bins, signed, truncation_px, partial(scratch.array, name))
+        for edges, name in ((left, "left planes"), (right, "right planes"))
+    ]
+    return OrientedField(ordered, bins, truncation_px, (images[0], images[1]))
+
+
+@cache
+def radius_steps(truncation_px: int) -> NDArray[np.float32]:
+    """Return what each plane's bit takes off the cut-off distance: from its radius to the next larger one [px]."""
+    radii = np.sqrt([*_offsets(truncation_px), truncation_px**2])
+    return np.diff(radii).astype(np.float32)
+
+
+@cache
+def _offsets(truncation_px: int) -> dict[int, tuple[tuple[int, int], ...]]:
+    """Return, by squared distance below the cut-off, the (dx, dy) >= 0 that have it, in rising order."""
+    reach = range(truncation_px)
+    pairs = [(dx, dy) for dx in reach for dy in reach if dx * dx + dy * dy < truncation_px**2]
+    squares = sorted({dx * dx + dy * dy for dx, dy in pairs})
+    return {s: tuple((dx, dy) for dx, dy in pairs if dx * dx + dy * dy == s) for s in squares}
+
+
+def _gaussian(length: int, sigma: float) -> NDArray[np.float64]:
+    return np.exp(-0.5 * ((np.arange(length) - (length - 1) / 2.0) / sigma) ** 2)
+
+
+def _oriented(
+    edges: Edges, windows: tuple[Window, ...], bins: int, signed: bool, truncation: int, buffer: Buffer
+) -> OrientedEdges:
+    inner = windows[-1]
+    rows, columns = (
+        slice(inner.top - truncation, inner.bottom + truncation),
+        slice(inner.left - truncation, inner.right + truncation),
+    )
+    mask = _margined(edges.mask, rows, columns)
+    stride = mask.shape[1]
+    at = np.flatnonzero(mask != 0)
+    row, column = np.divmod(at, stride)
+    image_at = (row + rows.start, column + columns.start)
+    direction = np.arctan2(edges.gradient_y[image_at], edges.gradient_x[image_at], dtype=np.float32)
+    per_turn = bins if signed else 2 * bins
+    bin_ = (np.rint(direction * np.float32(per_turn / (2 * np.pi))).astype(np.int8) % bins).astype(np.uint8)
+    base = np.zeros(mask.size, np.uint8)
+    base[at] = np.left_shift(np.uint8(1), bin_)
+    row -= truncation
+    column -= truncation
+    ring = np.maximum(
+        _rings([(w.top - inner.top, w.bottom - inner.top) for w in windows], inner.height, truncation)[row],
+        _rings([(w.left - inner.left, w.right - inner.left) for w in windows], inner.width, truncation)[column],
+    )
+    inside = np.flatnonzero(ring < len(windows))
+    return OrientedEdges(
+        row[inside], column[inside], bin_[inside], ring[inside], at[inside], _planes(base, stride, truncation, buffer)
+    )
+
+
+def _margined(mask: NDArray[np.uint8], rows: slice, columns: slice) -> NDArray[np.uint8]:
+    """Return mask[rows, columns], with zeros where that leaves the mask."""
+    height, width = mask.shape
+    inside = mask[max(rows.start, 0) : rows.stop, max(columns.start, 0) : columns.stop]
+    lacking = (max(-rows.start, 0), max(rows.stop - height, 0)), (max(-columns.start, 0), max(columns.stop - width, 0))
+    return np.pad(inside, lacking) if any(map(any, lacking)) else inside
+
+
+def _rings(spans: list[tuple[int, int]], length: int, margin: int) -> NDArray[np.int64]:
+    """Return, for each position from 0 to length + margin and then from -margin, the first span that holds it."""
+    ring = np.full(length + 2 * margin, len(spans), np.int64)
+    for i, (start, stop) in reversed(list(enumerate(spans))):
+        ring[start:stop] = i
+    return ring
+
+
+def _planes(base: NDArray[np.uint8], stride: int, truncation: int, buffer: Buffer) -> NDArray[np.uint8]:
+    """Return the planes of all radii below the cut-off; rows are laid end to end, the outer margin is not valid."""
+    planes = buffer((len(_offsets(truncation)), base.size), np.uint8)
+    margin = (truncation - 1) * stride + truncation
+    inner = slice(margin, base.size - margin)
+    aside = [base]  # base shifted by dx to both sides
+    for dx in range(1, truncation):
+        both = np.zeros_like(base)
+        np.bitwise_or(base[2 * dx :], base[: -2 * dx], out=both[dx:-dx])
+        aside.append(both)
+    planes[0] = base
+    for i, offsets in enumerate(_offsets(truncation).values()):
+        plane, before = planes[i, inner], planes[max(i - 1, 0), inner]
+        for dx, dy in offsets:
+            for shift in {dy * stride, -dy * stride}:
+                np.bitwise_or(before, aside[dx][margin + shift : base.size - margin + shift], out=plane)
+                before = plane
+    return planes

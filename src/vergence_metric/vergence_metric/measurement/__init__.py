@@ -1,0 +1,1 @@
+"""What edge_metric_node measures on one pair."""

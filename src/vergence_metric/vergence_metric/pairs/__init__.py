@@ -1,0 +1,1 @@
+"""Two streams of images to synchronised pairs."""

@@ -1,0 +1,137 @@
+"""box_metric_node: pairs of images in, the target's boxes in both eyes, metric II and the target's place out."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import cv2
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import Header
+
+from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
+from vergence_common.images import array_to_image
+from vergence_common.node_main import run_node
+from vergence_common.parameters import ParameterSet, declare
+from vergence_common.qos import IMAGE_QOS, watch_qos
+from vergence_metric.boxes import BoxMeasurement, BoxVergenceResult, DetectorError, draw
+from vergence_metric.boxes.parameters import BoxMetricNodeParameters
+from vergence_metric.pairs.latest_worker import LatestWorker
+from vergence_metric.ros.box_messages import (
+    box_vergence_message,
+    detections_message,
+    point_message,
+    vision_message,
+    vision_type,
+)
+from vergence_metric.ros.pair_node import PairNode
+from vergence_metric.ros.stereo_input import ImagePair, StereoInput
+from vergence_msgs.msg import BoxVergence, StereoDetections
+from vergence_rig.rig import load_rig
+
+EYES = ("left", "right")
+
+
+class BoxMetricNode(PairNode):
+    """Measures the newest pair, at most `rate_hz` times a second, on a thread of its own."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("box_metric_node", **options)
+        self._settings = declare(self, BoxMetricNodeParameters)
+        settings: BoxMetricNodeParameters = self._settings.value
+        cv2.setNumThreads(settings.threads or -1)
+        rig = load_rig(settings.rig)
+        self._measurement = BoxMeasurement(settings, rig.baseline_m)
+        self.get_logger().info(self._measurement.detector.describe())
+        self._counts: dict[str, int] = {}
+        self._due_ns = 0
+        diagnostics = Diagnostics(self)
+        qos = watch_qos(self, diagnostics)
+        self._box_publisher = qos.create_publisher(BoxVergence, "vergence/box")
+        self._point_publisher = qos.create_publisher(PoseWithCovarianceStamped, "vergence/target_point")
+        self._detections_publisher = qos.create_publisher(StereoDetections, "vergence/detections")
+        self._overlay_publisher = qos.create_publisher(Image, "vergence/box_overlay", IMAGE_QOS)
+        vision = vision_type()
+        self._vision_publishers = [
+            qos.create_publisher(vision, f"vergence/{eye}_detections") for eye in EYES if vision is not None
+        ]
+        self._worker: LatestWorker[ImagePair] = LatestWorker(
+            self._measure, self._on_failure, "measure", settings.niceness
+        )
+        self._stereo = StereoInput(self, settings, diagnostics, qos, self._on_pair)
+        self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
+        self.add_on_set_parameters_callback(self._refuse_unknown_classes)
+        self._settings.on_change(self._on_settings)
+        diagnostics.add("detector", self._report)
+
+    def _refuse_unknown_classes(self, changes: list[Parameter]) -> SetParametersResult:
+        wanted = next((tuple(c.value or ()) for c in changes if c.name == "classes"), ())
+        try:
+            self._measurement.detector.class_ids(wanted)
+        except DetectorError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _on_settings(self, settings: ParameterSet) -> None:
+        cv2.setNumThreads(settings.value.threads or -1)
+        self._stereo.set_parameters(settings.value)
+
+    def _on_pair(self, pair: ImagePair) -> None:
+        settings: BoxMetricNodeParameters = self._settings.value
+        if not settings.enable:
+            return
+        period_ns = round(1e9 / settings.rate_hz)
+        # A beat of its own, so that 15 Hz of 30 is every second pair; after a gap or a jump back it begins anew.
+        late_ns, slack_ns = pair.left_stamp_ns - self._due_ns, period_ns // 10
+        if -2 * period_ns <= late_ns < -slack_ns:
+            return
+        on_beat = -slack_ns <= late_ns < period_ns
+        self._due_ns = (self._due_ns if on_beat else pair.left_stamp_ns) + period_ns
+        self._worker.submit(pair)
+
+    def _measure(self, pair: ImagePair) -> None:
+        self._measurement.set_parameters(self._settings.value)
+        eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
+        models = self._stereo.models_for(pair.left.pixels)
+        with self._times.measure("metric"):
+            result = self._measurement.measure(
+                pair.left.pixels, pair.right.pixels, pair.left_stamp_ns * 1e-9, eyes, models
+            )
+        self._publish(pair, result)
+        self._counts[result.status.name] = self._counts.get(result.status.name, 0) + 1
+        self._failure = None
+
+    def _publish(self, pair: ImagePair, result: BoxVergenceResult) -> None:
+        header: Header = pair.left.header
+        skew_s = pair.skew_ns * 1e-9
+        self._box_publisher.publish(box_vergence_message(result, header, skew_s))
+        if result.point is not None:
+            self._point_publisher.publish(point_message(result.point, header))
+        if self._detections_publisher.get_subscription_count():
+            self._detections_publisher.publish(detections_message(result, header, skew_s))
+        seen = (result.left_detections, result.right_detections)
+        for publisher, detections, image in zip(self._vision_publishers, seen, (pair.left, pair.right), strict=False):
+            if publisher.get_subscription_count():
+                publisher.publish(vision_message(detections, image.header))
+        if self._overlay_publisher.get_subscription_count():
+            with self._times.measure("overlay"):
+                picture = draw(pair.left.pixels, pair.right.pixels, result)
+                self._overlay_publisher.publish(array_to_image(picture, header))
+
+    def _report(self) -> Report:
+        values: dict[str, object] = {"model": self._measurement.detector.describe()}
+        values |= {"measured": self._worker.worked, "dropped": self._worker.dropped} | self._counts
+        values |= self._times.summary()
+        if self._failure is not None:
+            return Report(ERROR, f"the last pair could not be measured: {self._failure}", values)
+        if not self._settings.value.enable:
+            return Report(OK, "not enabled", values)
+        if self._worker.dropped > self._worker.worked // 10:
+            return Report(WARN, f"too slow for {self._settings.value.rate_hz:g} Hz", values)
+        return Report(OK, f"{self._worker.worked} pairs measured", values)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node; see `vergence_common.node_main`."""
+    return run_node(BoxMetricNode, args)

@@ -1,0 +1,104 @@
+"""edge_metric_node: pairs of images in, metric I, the signed error of the fovea and the followed target out."""
+
+from collections.abc import Sequence
+from time import monotonic_ns
+from typing import Any
+
+import cv2
+from sensor_msgs.msg import Image, JointState
+
+from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
+from vergence_common.images import array_to_image
+from vergence_common.node_main import run_node
+from vergence_common.parameters import ParameterSet, declare
+from vergence_common.qos import IMAGE_QOS, watch_qos
+from vergence_metric.measurement.edge_metric import EdgeMetricResult
+from vergence_metric.measurement.overlay import draw_overlay
+from vergence_metric.measurement.pair_measurement import Models, PairMeasurement
+from vergence_metric.measurement.parameters import EdgeMetricNodeParameters
+from vergence_metric.pairs.latest_worker import LatestWorker
+from vergence_metric.pairs.viewing_angles import angular_disparity
+from vergence_metric.ros.metric_messages import edge_message, error_message, track_message
+from vergence_metric.ros.pair_node import PairNode
+from vergence_metric.ros.stereo_input import ImagePair, StereoInput
+from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
+from vergence_rig.rig import load_rig
+
+_GLANCED_BACK_NS = 500_000_000
+
+
+class EdgeMetricNode(PairNode):
+    """Measures the newest pair on a thread of its own; the executor's thread only takes images and pairs them."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("edge_metric_node", **options)
+        self._settings = declare(self, EdgeMetricNodeParameters)
+        settings: EdgeMetricNodeParameters = self._settings.value
+        cv2.setNumThreads(settings.threads or -1)
+        self._measurement = PairMeasurement(settings, load_rig(settings.rig))
+        diagnostics = Diagnostics(self)
+        qos = watch_qos(self, diagnostics)
+        self._edge_publisher = qos.create_publisher(EdgeVergence, "vergence/edge")
+        self._error_publisher = qos.create_publisher(VergenceError, "vergence/error")
+        self._track_publisher = qos.create_publisher(TargetTrack, "vergence/track")
+        self._overlay_publisher = qos.create_publisher(Image, "vergence/overlay", IMAGE_QOS)
+        self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
+        self._stereo = StereoInput(self, settings, diagnostics, qos, self._worker.submit)
+        self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
+        self._settings.on_change(self._on_settings)
+        diagnostics.add("measurement", self._report)
+
+    def _on_settings(self, settings: ParameterSet) -> None:
+        cv2.setNumThreads(settings.value.threads or -1)
+        self._stereo.set_parameters(settings.value)
+
+    def _measure(self, pair: ImagePair) -> None:
+        self._measurement.set_parameters(self._settings.value)
+        header, skew_s = pair.left.header, pair.skew_ns * 1e-9
+        models = self._stereo.models_for(pair.left.pixels)
+        with self._times.measure("metric"):
+            edge = self._measurement.edge(pair.left.pixels, pair.right.pixels)
+        with self._times.measure("disparity"):
+            disparity = self._measurement.disparity(edge)
+        angular = models and angular_disparity(
+            *models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px
+        )
+        with self._times.measure("publish"):
+            error = error_message(disparity, angular, header, skew_s)
+            verged = self._measurement.verged(edge, error.horizontal_px, error.confidence)
+            self._edge_publisher.publish(edge_message(edge, verged, header, skew_s))
+            self._error_publisher.publish(error)
+        self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
+        self._times.add_all(edge.stage_s)
+        self._publish_track(pair, edge, models)
+        if self._overlay_publisher.get_subscription_count():
+            with self._times.measure("overlay"):
+                picture = draw_overlay(pair.left.pixels, edge, disparity)
+                self._overlay_publisher.publish(array_to_image(picture, header))
+        self._measurement.settle()
+        self._failure = None
+
+    def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, models: Models | None) -> None:
+        with self._times.measure("tracker"):
+            now_ns = pair.left_stamp_ns
+            eyes = self._joints.at(now_ns, pair.right_stamp_ns)
+            told = self._joints.told_between(now_ns - _GLANCED_BACK_NS, now_ns)
+            on_the_way = [(stamp_ns * 1e-9, angles) for stamp_ns, angles in told]
+            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models, on_the_way)
+        angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
+        self._track_publisher.publish(track_message(track, edge, angular, pair.left.header, pair.skew_ns * 1e-9))
+
+    def _report(self) -> Report:
+        worked, dropped = self._worker.worked, self._worker.dropped
+        values: dict[str, object] = {"measured": worked, "dropped": dropped}
+        values |= self._stereo.decode_times.summary() | self._times.summary()
+        if self._failure is not None:
+            return Report(ERROR, f"the last pair could not be measured: {self._failure}", values)
+        if dropped:
+            return Report(WARN, f"too slow: {dropped} of {worked + dropped} pairs were left out", values)
+        return Report(OK, f"{worked} pairs measured", values)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node; see `vergence_common.node_main`."""
+    return run_node(EdgeMetricNode, args)

@@ -1,0 +1,235 @@
+"""The image messages of both eyes become pairs of arrays; shared by every node that measures pairs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import monotonic, monotonic_ns
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, QoSReliabilityPolicy
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
+
+from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
+from vergence_common.images import ImageError, compressed_to_array, image_to_array
+from vergence_common.qos import IMAGE_QOS, QosWatch
+from vergence_common.stamps import to_nanoseconds
+from vergence_metric.pairs.pairing import LEFT, RIGHT, Pair, StereoPairer
+from vergence_metric.pairs.stage_times import StageTimes
+from vergence_metric.pairs.stereo_parameters import StereoParameters
+from vergence_metric.pairs.stream_health import Finding, StreamHealth
+from vergence_rig.camera import CameraError, CameraModel
+
+SIDES = ("left", "right")
+
+# A camera's description is small and repeated with every image: best effort fits every publisher.
+_INFO_QOS = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
+
+
+@dataclass(frozen=True, slots=True)
+class ImageFrame:
+    """One eye's image: its header, its pixels (h, w, 3) BGR or (h, w) grey uint8, and when it came [ns, monotonic]."""
+
+    header: Header
+    pixels: npt.NDArray[np.uint8]
+    arrived_ns: int
+
+
+ImagePair = Pair[ImageFrame]
+
+
+@dataclass(frozen=True, slots=True)
+class _Undecoded:
+    """One eye's image as it came."""
+
+    message: Any
+    arrived_ns: int
+
+
+class StereoInput:
+    """Subscribes both eyes, gives every pair of images of one size to `on_pair`, and reports on all of it.
+
+    `on_pair` runs in the executor's thread and should only hand the pair on. `models` holds the left and the right
+    camera as camera_info describes them, None before. With `wanted`, only
+    pairs whose left stamp [ns] it wants are decoded, and then both images at once; the others only count as received.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        parameters: StereoParameters,
+        diagnostics: Diagnostics,
+        qos: QosWatch,
+        on_pair: Callable[[ImagePair], None],
+        wanted: Callable[[int], bool] | None = None,
+    ) -> None:
+        self.models: list[CameraModel | None] = [None, None]
+        self.decode_times = StageTimes()
+        self._node = node
+        self._parameters = parameters
+        self._on_pair = on_pair
+        self._wanted = wanted
+        self._pairer: StereoPairer[Any] = StereoPairer(parameters)
+        self._size_mismatch: str | None = None
+        self._size_mismatches = 0
+        self._info_errors: list[str | None] = [None, None]
+        self._info_seen: list[tuple[Any, ...] | None] = [None, None]
+        self._deadline = node.create_timer(
+            1.0, self._on_deadline, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False
+        )
+        compressed = parameters.image_transport == "compressed"
+        message_type, suffix = (CompressedImage, "image_raw/compressed") if compressed else (Image, "image_raw")
+        self._to_pixels: Callable[[Any], npt.NDArray[np.uint8]] = compressed_to_array if compressed else image_to_array
+        self._health = tuple(StreamHealth(f"{name}/{suffix}", monotonic()) for name in SIDES)
+        self._subscriptions: list[Subscription] = []
+        for side, name in enumerate(SIDES):
+            self._subscribe(qos, message_type, f"{name}/{suffix}", self._on_image, side, IMAGE_QOS)
+            self._subscribe(qos, CameraInfo, f"{name}/camera_info", self._on_info, side, _INFO_QOS)
+            diagnostics.add(f"{name} images", lambda side=side: self._stream_report(side))  # type: ignore[misc]
+        diagnostics.add("pairs", self._pairs_report)
+        diagnostics.add("cameras", self._cameras_report)
+
+    def set_parameters(self, parameters: StereoParameters) -> None:
+        """Pair by these from the next image on; the transport stays as it is."""
+        self._parameters = parameters
+        self._pairer.set_parameters(parameters)
+
+    def _subscribe(
+        self, qos: QosWatch, kind: Any, topic: str, callback: Callable[[int, Any], None], side: int, profile: QoSProfile
+    ) -> None:
+        def receive(message: Any) -> None:
+            callback(side, message)
+
+        self._subscriptions.append(qos.create_subscription(kind, topic, receive, profile))
+
+    def _on_image(self, side: int, message: Any) -> None:
+        now_ns = monotonic_ns()
+        health = self._health[side]
+        stamp_ns = to_nanoseconds(message.header.stamp)
+        age_s = (self._node.get_clock().now().nanoseconds - stamp_ns) * 1e-9
+        if self._wanted is not None:
+            health.pass_over(now_ns * 1e-9, age_s)
+            self._give(self._pairer.add(side, stamp_ns, _Undecoded(message, now_ns), now_ns))
+            return
+        frame = self._decoded(side, message, now_ns)
+        if frame is None:
+            return
+        health.accept(now_ns * 1e-9, age_s, (frame.pixels.shape[1], frame.pixels.shape[0]))
+        self._give(self._pairer.add(side, stamp_ns, frame, now_ns))
+
+    def _decoded(self, side: int, message: Any, arrived_ns: int) -> ImageFrame | None:
+        health = self._health[side]
+        try:
+            with self.decode_times.measure("decode"):
+                return ImageFrame(message.header, self._to_pixels(message), arrived_ns)
+        except ImageError as error:
+            health.refuse(monotonic_ns() * 1e-9, str(error))
+            self._node.get_logger().warning(f"{health.topic}: {error}", throttle_duration_sec=5.0)
+            return None
+
+    def _decoded_pair(self, pair: Pair[Any]) -> ImagePair | None:
+        if self._wanted is None:
+            return pair
+        if not self._wanted(pair.left_stamp_ns):
+            return None
+        left, right = (
+            self._decoded(side, frame.message, frame.arrived_ns) for side, frame in enumerate((pair.left, pair.right))
+        )
+        if left is None or right is None:
+            return None
+        for health, frame in zip(self._health, (left, right), strict=True):
+            health.looked_into((frame.pixels.shape[1], frame.pixels.shape[0]))
+        return Pair(left, right, pair.left_stamp_ns, pair.right_stamp_ns)
+
+    def _on_deadline(self) -> None:
+        self._deadline.cancel()
+        self._give(self._pairer.expire(monotonic_ns()))
+
+    def _give(self, pairs: list[Pair[Any]]) -> None:
+        deadline_ns = self._pairer.deadline_ns
+        if deadline_ns is not None:
+            self._deadline.timer_period_ns = max(deadline_ns - monotonic_ns(), 1)
+            self._deadline.reset()
+        for pair in filter(None, map(self._decoded_pair, pairs)):
+            left, right = pair.left.pixels.shape, pair.right.pixels.shape
+            if left[:2] != right[:2]:
+                self._size_mismatch = (
+                    f"left images are {left[1]}x{left[0]}, right ones {right[1]}x{right[0]}: they must be alike"
+                )
+                self._size_mismatches += 1
+                continue
+            self._size_mismatch = None
+            self._on_pair(pair)
+
+    def _on_info(self, side: int, message: CameraInfo) -> None:
+        seen = (message.width, message.height, tuple(message.k), tuple(message.d), message.distortion_model)
+        if seen == self._info_seen[side]:
+            return
+        self._info_seen[side] = seen
+        try:
+            self.models[side] = CameraModel.from_camera_info_values(*seen)
+            self._info_errors[side] = None
+        except CameraError as error:
+            self.models[side] = None
+            self._info_errors[side] = str(error)
+
+    def models_for(self, pixels: npt.NDArray[np.uint8]) -> tuple[CameraModel, CameraModel] | None:
+        """Return both camera models if they are known and are for images of this size."""
+        left, right = self.models[LEFT], self.models[RIGHT]
+        if left is None or right is None:
+            return None
+        size = (pixels.shape[1], pixels.shape[0])
+        if (left.width_px, left.height_px) != size or (right.width_px, right.height_px) != size:
+            return None
+        return left, right
+
+    def _stream_report(self, side: int) -> Report:
+        health = self._health[side]
+        publishers = self._node.count_publishers(self._node.resolve_topic_name(health.topic))
+        found = health.finding(monotonic(), publishers, self._parameters.stalled_after_s)
+        late = self._pairer.statistics.late[side]
+        return _report(found, ERROR, {"out_of_order": late})
+
+    def _pairs_report(self) -> Report:
+        counts = self._pairer.statistics
+        values: dict[str, object] = {
+            "pairs": counts.pairs,
+            "unmatched_left": counts.unmatched[LEFT],
+            "unmatched_right": counts.unmatched[RIGHT],
+            "resets": counts.resets,
+            "size_mismatches": self._size_mismatches,
+        }
+        if counts.skew_median_s is not None and counts.skew_largest_s is not None:
+            values["skew_median_ms"] = counts.skew_median_s * 1e3
+            values["skew_largest_ms"] = counts.skew_largest_s * 1e3
+        if self._size_mismatch is not None:
+            return Report(ERROR, self._size_mismatch, values)
+        complaint = counts.complaint(self._parameters.pair_slop_s)
+        if complaint is not None:
+            return Report(ERROR, complaint, values)
+        if counts.pairs == 0:
+            return Report(WARN, "no pair yet", values)
+        return Report(OK, f"{counts.pairs} pairs", values)
+
+    def _cameras_report(self) -> Report:
+        for side, name in enumerate(SIDES):
+            if self._info_errors[side] is not None:
+                return Report(ERROR, f"{name}/camera_info: {self._info_errors[side]}")
+            model, size = self.models[side], self._health[side].size_px
+            if model is None:
+                return Report(WARN, f"{name}/camera_info: none yet, angles are NaN")
+            if size is not None and (model.width_px, model.height_px) != size:
+                return Report(
+                    ERROR,
+                    f"{name}/camera_info is for {model.width_px}x{model.height_px}, images are {size[0]}x{size[1]}: "
+                    "angles are NaN",
+                )
+        return Report(OK, "both cameras are described")
+
+
+def _report(found: Finding, level: int, more: dict[str, object]) -> Report:
+    return Report(OK if found.fine else level, found.sentence, found.values | more)

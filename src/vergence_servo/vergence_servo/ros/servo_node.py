@@ -1,0 +1,245 @@
+"""servo_node: commands on topics to pulses on wires, safely."""
+
+import dataclasses
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSDurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import SetBool, Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+from vergence_common.diagnostics import Diagnostics, Report
+from vergence_common.node_main import run_node
+from vergence_common.parameters import ParameterSet, declare
+from vergence_common.qos import watch_qos
+from vergence_common.stamps import to_nanoseconds
+from vergence_rig.rig import JOINT_NAMES, load_rig
+from vergence_servo.calibration import CalibrationError, load_servos, servo_limits
+from vergence_servo.command_guard import (
+    CommandRefusedError,
+    StampGuard,
+    StampLimits,
+    named_positions,
+    ordered_positions,
+)
+from vergence_servo.commanders import conflict
+from vergence_servo.drivers.lgpio import JITTER_WARNING
+from vergence_servo.drivers.registry import BACKENDS, open_driver
+from vergence_servo.guardian import Guardian
+from vergence_servo.last_pose import default_pose_file, read_pose, write_pose
+from vergence_servo.ros import servo_messages as convert
+from vergence_servo.servo_channel import ServoChannel
+from vergence_servo.servo_head import Mode, ServoHead
+from vergence_servo.servo_health import CommandCounts, Health, channel_health, commands_health, head_health
+from vergence_servo.servo_parameters import ServoNodeParameters
+from vergence_servo.trajectory import Trajectory, check_end, start_delay_s
+
+COMMAND_TOPICS = ("joint_command", "~/commands", "joint_trajectory")
+
+
+class ServoNode(Node):
+    """The rim of ServoHead."""
+
+    def __init__(self, **node_options: Any) -> None:
+        super().__init__("servo_node", **node_options)
+        groups = [(f"{name}.", parameters) for name, (parameters, _) in BACKENDS.items()]
+        self._settings = declare(self, ServoNodeParameters, *groups)
+        values: ServoNodeParameters = self._settings.value
+        servos = load_servos(values.servos)
+        rig = load_rig(values.rig)
+        for name in values.joints:
+            if name not in servos:
+                raise CalibrationError(f"joint '{name}' has no servo: servos.yaml has {', '.join(servos)}")
+        limits = {
+            name: servo_limits(name, servos[name], rig.joints[name] if name in JOINT_NAMES else None)
+            for name in values.joints
+        }
+        backend_values = dataclasses.asdict(self._settings.get(BACKENDS[values.backend][0]))
+        self._driver = open_driver(values.backend, backend_values)
+        self._guardian: Guardian | None = None
+        try:
+            if values.guardian and self._driver.outlives_process:
+                channels = [limit.calibration.channel for limit in limits.values()]
+                self._guardian = Guardian(values.backend, backend_values, channels)
+            self._pose_file = Path(values.pose_file) if values.pose_file else default_pose_file()
+            self._pose = read_pose(self._pose_file)
+            self._head = ServoHead(self._driver, limits, values, self._pose, time.monotonic())
+        except BaseException:
+            self._driver.close()
+            if self._guardian is not None:
+                self._guardian.dismiss()
+            raise
+        self._stamps = self._new_stamp_guard(values)
+        self._settings.on_change(self._changed)
+        self._counts = CommandCounts()
+        self._conflict = ""
+        self._reported_rad: tuple[float, dict[str, float]] = (time.monotonic(), {})
+        self._begin(values)
+        self._connect(values)
+
+    def _begin(self, values: ServoNodeParameters) -> None:
+        if values.backend == "lgpio":
+            self.get_logger().warning(JITTER_WARNING)
+        if values.backend == "fake":
+            self.get_logger().warning("backend 'fake': no servo moves; set 'backend' and 'servos' for a real head")
+        if not values.enabled:
+            self._head.enable(False, time.monotonic())
+        elif values.start == "last_pose" and self._pose:
+            self._head.attach_all(time.monotonic())
+        elif values.start == "last_pose":
+            self.get_logger().warning(f"no last pose in {self._pose_file}: starting released")
+
+    def _connect(self, values: ServoNodeParameters) -> None:
+        diagnostics = Diagnostics(self, values.backend)
+        diagnostics.add(
+            "servos", lambda: _report(head_health(self._head, values.backend, self._driver, self._guardian))
+        )
+        diagnostics.add("commands", lambda: _report(commands_health(self._counts, self._conflict, time.monotonic())))
+        for channel in self._head.channels.values():
+            diagnostics.add(channel.name, partial(_channel_report, channel))
+        watch = watch_qos(self, diagnostics)
+        self._states = watch.create_publisher(JointState, "joint_states")
+        latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
+        steps_rad = {
+            name: channel.limits.calibration.step_rad(self._driver.resolution_us)
+            for name, channel in self._head.channels.items()
+        }
+        self._resolution = watch.create_publisher(JointState, "~/resolution", latched)
+        self._resolution.publish(convert.resolution(self.get_clock().now().to_msg(), steps_rad))
+        watch.create_subscription(JointState, "joint_command", self._on_command)
+        watch.create_subscription(Float64MultiArray, "~/commands", self._on_commands)
+        watch.create_subscription(JointTrajectory, "joint_trajectory", self._on_trajectory)
+        self.create_service(SetBool, "~/enable", self._on_enable)
+        self.create_service(Trigger, "~/park", lambda request, response: self._on_trigger(self._head.park, response))
+        self.create_service(
+            Trigger, "~/release", lambda request, response: self._on_trigger(self._head.release, response)
+        )
+        self.create_timer(1.0 / values.update_rate_hz, lambda: self._head.step(time.monotonic()))
+        self.create_timer(1.0 / values.state_rate_hz, self._publish_state)
+        self.create_timer(1.0, self._look_around)
+
+    def _on_command(self, message: JointState) -> None:
+        def take(now_s: float) -> None:
+            positions = named_positions(message.name, message.position, tuple(self._head.channels))
+            self._check_stamp(message)
+            self._head.command(positions, now_s)
+
+        self._take("joint_command", take)
+
+    def _on_commands(self, message: Float64MultiArray) -> None:
+        def take(now_s: float) -> None:
+            self._head.command(ordered_positions(message.data, tuple(self._head.channels)), now_s)
+
+        self._take("~/commands", take)
+
+    def _on_trajectory(self, message: JointTrajectory) -> None:
+        def take(now_s: float) -> None:
+            points = convert.trajectory_points(message)
+            trajectory = Trajectory(message.joint_names, points, self._head.sent_rad())
+            stamp_ns, now_ns = to_nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
+            values: ServoNodeParameters = self._settings.value
+            delay_s = start_delay_s(stamp_ns, now_ns, values.command_max_age_s)
+            check_end(delay_s + trajectory.duration_s, values.trajectory_max_s)
+            self._head.follow(trajectory, now_s + delay_s, now_s)
+
+        self._take("joint_trajectory", take)
+
+    def _take(self, topic: str, take: Callable[[float], None]) -> None:
+        now_s = time.monotonic()
+        try:
+            take(now_s)
+        except CommandRefusedError as error:
+            self._counts.refused(topic, str(error), now_s)
+            self.get_logger().warning(f"{topic} refused: {error}", throttle_duration_sec=1.0)
+            return
+        self._counts.accepted(topic, now_s)
+        self._head.step(now_s)
+
+    def _check_stamp(self, message: JointState) -> None:
+        self._stamps.check(to_nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds)
+
+    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        self._head.enable(request.data, time.monotonic())
+        response.success, response.message = True, self._head.mode.value
+        return response
+
+    def _on_trigger(self, act: Callable[[float], None], response: Trigger.Response) -> Trigger.Response:
+        try:
+            act(time.monotonic())
+            response.success, response.message = True, self._head.mode.value
+        except CommandRefusedError as error:
+            response.success, response.message = False, str(error)
+        return response
+
+    def _publish_state(self) -> None:
+        now_s = time.monotonic()
+        positions = self._head.positions_rad(now_s)
+        before_s, before = self._reported_rad
+        elapsed_s = max(now_s - before_s, 1e-3)
+        velocities = {name: (position - before.get(name, position)) / elapsed_s for name, position in positions.items()}
+        self._reported_rad = (now_s, positions)
+        self._states.publish(convert.joint_state(self.get_clock().now().to_msg(), positions, velocities))
+
+    def _look_around(self) -> None:
+        found = conflict(convert.commanders(self, COMMAND_TOPICS))
+        if found and found != self._conflict:
+            self.get_logger().error(found)
+        self._conflict = found
+        if self._head.mode is not Mode.COMMANDED:
+            self._remember_pose()
+
+    def _remember_pose(self) -> None:
+        pose = self._head.sent_rad()
+        if pose == self._pose:
+            return
+        try:
+            write_pose(self._pose_file, pose)
+        except OSError as error:
+            self.get_logger().warning(f"the last pose cannot be kept: {error}", throttle_duration_sec=60.0)
+        self._pose = pose
+
+    def _changed(self, settings: ParameterSet) -> None:
+        self._head.set_parameters(settings.value)
+        self._stamps = self._new_stamp_guard(settings.value)
+
+    @staticmethod
+    def _new_stamp_guard(values: ServoNodeParameters) -> StampGuard:
+        return StampGuard(StampLimits(values.command_max_age_s, values.command_max_ahead_s, values.command_timeout_s))
+
+    def close(self) -> None:
+        """Park, release everything and free the hardware."""
+        limit_s = self._settings.value.park_time_limit_s
+        deadline_s = time.monotonic() + limit_s
+        if self._head.pulsing and limit_s > 0:
+            self._head.park(time.monotonic(), only_pulsing=True)
+            while not self._head.parked and time.monotonic() < deadline_s:
+                self._head.step(time.monotonic())
+                time.sleep(0.005)
+        self._remember_pose()
+        self._head.release(time.monotonic())
+        self._driver.close()
+        if self._guardian is not None:
+            self._guardian.dismiss()
+
+
+def _channel_report(channel: ServoChannel) -> Report:
+    return _report(channel_health(channel, time.monotonic()))
+
+
+def _report(health: Health) -> Report:
+    return Report(health.level, health.message, health.values)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(ServoNode, args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,1 @@
+"""The ROS rim: nodes and message conversion."""
