@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from vergence_bringup.node_table import EXECUTABLES, parameter_groups
+from vergence_bringup.node_table import NODES, parameter_groups
 from vergence_rig.parameters import ParameterSpec
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "parameters.md"
@@ -18,7 +18,7 @@ while the node runs, and a request is applied as a whole or not at all.
 def page() -> str:
     """Return the page's text."""
     parts = [_HEAD]
-    for executable, entry in EXECUTABLES.items():
+    for executable, entry in NODES.items():
         parts.append(f"## {entry.package} {executable}\n")
         parts.append("| parameter | default | allowed | what |\n|---|---|---|---|")
         for prefix, group in parameter_groups(executable):

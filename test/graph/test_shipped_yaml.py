@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
-from vergence_bringup.node_table import EXECUTABLES, parameter_groups
+from vergence_bringup.node_table import NODES, parameter_groups
 from vergence_rig.parameters import ParameterSpec
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
@@ -34,10 +34,10 @@ def flattened(values: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def test_every_yaml_is_an_executables_and_the_other_way_round() -> None:
-    assert {path.stem for path in CONFIG.glob("*.yaml")} - NOT_EXECUTABLES == set(EXECUTABLES)
+    assert {path.stem for path in CONFIG.glob("*.yaml")} - NOT_EXECUTABLES == set(NODES)
 
 
-@pytest.mark.parametrize("executable", sorted(EXECUTABLES))
+@pytest.mark.parametrize("executable", sorted(NODES))
 def test_values_equal_the_defaults(executable: str) -> None:
     specs = specs_of(executable)
     expected = {n: list(s.default) if s.is_list else s.default for n, s in specs.items() if not s.required}
@@ -46,7 +46,7 @@ def test_values_equal_the_defaults(executable: str) -> None:
     assert {name: type(value) for name, value in found.items()} == {n: type(v) for n, v in expected.items()}
 
 
-@pytest.mark.parametrize("executable", sorted(EXECUTABLES))
+@pytest.mark.parametrize("executable", sorted(NODES))
 def test_required_ones_are_shown_but_left_to_the_user(executable: str) -> None:
     text = (CONFIG / f"{executable}.yaml").read_text()
     for name, spec in specs_of(executable).items():

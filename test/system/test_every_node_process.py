@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from vergence_bringup.node_table import EXECUTABLES
+from vergence_bringup.node_table import NODES
 from vergence_bringup.ros.processes import find_executable
 
 pytestmark = pytest.mark.system
@@ -17,7 +17,7 @@ CONFIG = Path(__file__).resolve().parents[2] / "config"
 
 
 def _command(executable: str, *arguments: str) -> list[str]:
-    return [str(find_executable(EXECUTABLES[executable].package, executable)), "--ros-args", *arguments]
+    return [str(find_executable(NODES[executable].package, executable)), "--ros-args", *arguments]
 
 
 def _run(executable: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
@@ -28,7 +28,7 @@ def _own_lines(text: str, executable: str) -> list[str]:
     return [line for line in text.splitlines() if line.startswith(f"{executable}: ")]
 
 
-@pytest.mark.parametrize("executable", sorted(EXECUTABLES))
+@pytest.mark.parametrize("executable", sorted(NODES))
 def test_an_unknown_parameter_ends_the_node(executable: str, domain_id: int) -> None:
     result = _run(executable, "--params-file", str(CONFIG / f"{executable}.yaml"), "-p", "no_such_parameter:=1")
     assert result.returncode == 2
@@ -37,7 +37,7 @@ def test_an_unknown_parameter_ends_the_node(executable: str, domain_id: int) -> 
     assert "Traceback" not in result.stderr
 
 
-@pytest.mark.parametrize("executable", sorted(EXECUTABLES))
+@pytest.mark.parametrize("executable", sorted(NODES))
 def test_a_rig_that_is_not_there_ends_the_node(executable: str, domain_id: int, tmp_path: Path) -> None:
     arguments = ["-p", "device:=/dev/null"] if executable == "camera_node" else []
     result = _run(executable, "-p", f"rig:={tmp_path / 'absent.yaml'}", *arguments)
@@ -46,7 +46,7 @@ def test_a_rig_that_is_not_there_ends_the_node(executable: str, domain_id: int, 
     assert "absent.yaml" in line
 
 
-@pytest.mark.parametrize("executable", sorted(EXECUTABLES))
+@pytest.mark.parametrize("executable", sorted(NODES))
 def test_a_file_that_is_not_yaml_ends_the_node(executable: str, domain_id: int, tmp_path: Path) -> None:
     path = tmp_path / "broken.yaml"
     path.write_text("/**: [ros__parameters: {")

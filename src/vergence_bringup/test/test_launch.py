@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vergence_bringup.node_table import EXECUTABLES
+from vergence_bringup.node_table import NODES
 
 pytest.importorskip("launch_ros", reason="launch is not installed here (it comes with ROS from apt)")
 
@@ -55,7 +55,7 @@ def test_the_detector_runs_where_it_is_asked_for(file, arguments, runs, rests):
     names = {name for name, _ in nodes(file, **arguments)}
     assert runs <= names
     assert not rests & names
-    assert names <= EXECUTABLES.keys()
+    assert names <= NODES.keys()
 
 
 @pytest.mark.parametrize(

@@ -1,52 +1,32 @@
-"""Every node executable and the parameter classes it declares: what the shipped YAML and the reference are held to."""
+"""The nodes of the graph: the one table that executables, doctor, demo, benchmarks and launch files read."""
 
 import importlib
 from dataclasses import dataclass
 
-from vergence_rig.parameters import Parameters
+from vergence_rig.parameters import Groups
 
 
 @dataclass(frozen=True)
-class Executable:
-    """One node: its package, and each parameter group as (prefix, "module:Class")."""
+class NodeEntry:
+    """One node: its package, and where its parameter groups stand, as "module:NAME" of a `Groups`."""
 
     package: str
-    groups: tuple[tuple[str, str], ...]
+    groups: str
 
 
-EXECUTABLES: dict[str, Executable] = {
-    "box_metric_node": Executable(
-        "vergence_metric", (("", "vergence_metric.boxes.parameters:BoxMetricNodeParameters"),)
-    ),
-    "camera_node": Executable("vergence_camera", (("", "vergence_camera.parameters:CameraParameters"),)),
-    "edge_metric_node": Executable(
-        "vergence_metric", (("", "vergence_metric.measurement.parameters:EdgeMetricNodeParameters"),)
-    ),
-    "eye_rotation_node": Executable(
-        "vergence_metric", (("", "vergence_metric.eye_rotation.parameters:EyeRotationNodeParameters"),)
-    ),
-    "gaze_controller_node": Executable(
-        "vergence_gaze", (("", "vergence_gaze.ros.gaze_controller_node:GazeNodeParameters"),)
-    ),
-    "servo_node": Executable(
-        "vergence_servo",
-        (
-            ("", "vergence_servo.servo_parameters:ServoNodeParameters"),
-            ("fake.", "vergence_servo.drivers.fake:FakeParameters"),
-            ("kernel_pwm.", "vergence_servo.drivers.kernel_pwm:KernelPwmParameters"),
-            ("pca9685.", "vergence_servo.drivers.pca9685:Pca9685Parameters"),
-            ("pigpio.", "vergence_servo.drivers.pigpio:PigpioParameters"),
-            ("lgpio.", "vergence_servo.drivers.lgpio:LgpioParameters"),
-        ),
-    ),
-    "sim_node": Executable("vergence_sim", (("", "vergence_sim.parameters:SimParameters"),)),
+NODES: dict[str, NodeEntry] = {
+    "box_metric_node": NodeEntry("vergence_metric", "vergence_metric.boxes.parameters:GROUPS"),
+    "camera_node": NodeEntry("vergence_camera", "vergence_camera.parameters:GROUPS"),
+    "edge_metric_node": NodeEntry("vergence_metric", "vergence_metric.measurement.parameters:GROUPS"),
+    "eye_rotation_node": NodeEntry("vergence_metric", "vergence_metric.eye_rotation.parameters:GROUPS"),
+    "gaze_controller_node": NodeEntry("vergence_gaze", "vergence_gaze.parameters:GROUPS"),
+    "servo_node": NodeEntry("vergence_servo", "vergence_servo.servo_parameters:GROUPS"),
+    "sim_node": NodeEntry("vergence_sim", "vergence_sim.parameters:GROUPS"),
 }
 
 
-def parameter_groups(executable: str) -> list[tuple[str, type[Parameters]]]:
+def parameter_groups(executable: str) -> Groups:
     """Return (prefix, class) of every parameter group of an executable."""
-    groups = []
-    for prefix, place in EXECUTABLES[executable].groups:
-        module, name = place.split(":")
-        groups.append((prefix, getattr(importlib.import_module(module), name)))
+    module, name = NODES[executable].groups.split(":")
+    groups: Groups = getattr(importlib.import_module(module), name)
     return groups

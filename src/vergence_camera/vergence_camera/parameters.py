@@ -7,7 +7,7 @@ from vergence_camera.errors import ChoiceError
 from vergence_camera.frame import ModeRequest
 from vergence_camera.source_choice import SourceOptions, kind_of
 from vergence_camera.v4l2.capture import READABLE_FORMATS
-from vergence_rig.parameters import REQUIRED, ParameterError, Parameters, parameter
+from vergence_rig.parameters import REQUIRED, Groups, ParameterError, Parameters, parameter
 
 
 @dataclass(frozen=True)
@@ -102,3 +102,6 @@ class CameraParameters(Parameters):
             last_retry_s=self.last_retry_s,
             stamp_offset_s=self.stamp_offset_s,
         )
+
+
+GROUPS: Groups = (("", CameraParameters),)

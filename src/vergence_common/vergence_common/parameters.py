@@ -8,7 +8,15 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from vergence_rig.parameters import ParameterError, Parameters, ParameterSpec, UnknownParameterError
+from vergence_rig.parameters import (
+    Groups,
+    ParameterError,
+    Parameters,
+    ParameterSpec,
+    RenamedParameterError,
+    UnknownParameterError,
+    renamed,
+)
 
 ROS_OWN = ("use_sim_time", "start_type_description_service")
 ROS_OWN_PREFIXES = ("qos_overrides.",)
@@ -51,37 +59,38 @@ class ParameterSet:
                 listener(self)
 
 
-def declare(
-    node: Node, *groups: type[Parameters] | tuple[str, type[Parameters]], allow_prefixes: tuple[str, ...] = ()
-) -> ParameterSet:
+def declare(node: Node, groups: Groups, allow_prefixes: tuple[str, ...] = ()) -> ParameterSet:
     """Declare every parameter of `groups` on `node` and return them validated.
 
     Args:
         node: the node, whose overrides (command line, YAML) are taken.
-        groups: parameter classes; `("disparity.", DisparityParameters)` gives a group a prefix.
-        allow_prefixes: names with these prefixes are somebody else's and not refused as unknown.
+        groups: parameter classes with the prefix of their names, such as `("disparity.", DisparityParameters)`.
+        allow_prefixes: names with these prefixes are declared elsewhere and not refused as unknown.
 
     Raises:
         ParameterError: a value of the wrong type or out of range, one that is required and missing, or a name that
-            nobody declares.
+            is not declared.
     """
-    named = [group if isinstance(group, tuple) else ("", group) for group in groups]
     overrides: dict[str, Parameter] = dict(node._parameter_overrides)
-    known = {prefix + spec.name for prefix, group in named for spec in group.specs()}
+    known = {prefix + spec.name for prefix, group in groups for spec in group.specs()}
+    former = renamed(groups)
     for name, override in overrides.items():
         if name in known or name in ROS_OWN or name.startswith(ROS_OWN_PREFIXES + allow_prefixes):
             continue
+        if name in former:
+            new_name, spec = former[name]
+            raise RenamedParameterError(name, override.value, new_name, spec.unit)
         raise UnknownParameterError(name, override.value, known)
 
     values = {}
-    for prefix, group in named:
+    for prefix, group in groups:
         given = {
             spec.name: _from_ros(spec, overrides[prefix + spec.name].value)
             for spec in group.specs()
             if prefix + spec.name in overrides
         }
         values[prefix] = _named(prefix, partial(group.from_mapping, given))
-    if len(values) != len(named):
+    if len(values) != len(groups):
         raise ValueError("two parameter groups have the same prefix")
 
     for prefix, instance in values.items():

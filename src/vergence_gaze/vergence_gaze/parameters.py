@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from vergence_rig.parameters import ParameterError, Parameters, parameter
+from vergence_rig.parameters import Groups, ParameterError, Parameters, parameter
 
 _DEG = math.pi / 180.0
 
@@ -133,3 +133,16 @@ class GazeParameters(Parameters):
             raise ParameterError(
                 "verged_leave_rad", self.verged_leave_rad, f"at least verged_enter_rad, {self.verged_enter_rad:g} [rad]"
             )
+
+
+@dataclass(frozen=True)
+class GazeNodeParameters(GazeParameters):
+    """The controller's parameters and the node's own."""
+
+    rig: str = parameter("", "path of rig.yaml; empty for the built-in rig", read_only=True)
+    control_rate_hz: float = parameter(
+        50.0, "control cycles a second", unit="Hz", minimum=5, maximum=1000, read_only=True
+    )
+
+
+GROUPS: Groups = (("", GazeNodeParameters),)

@@ -39,8 +39,17 @@ class ParameterError(ValueError):
         self.name, self.value, self.allowed = name, value, allowed
 
 
+class RenamedParameterError(ParameterError):
+    """A parameter given by a name that it no longer has."""
+
+    def __init__(self, name: str, value: object, new_name: str, unit: str) -> None:
+        in_unit = f" (in {unit})" if unit else ""
+        ValueError.__init__(self, f"parameter '{name}' was renamed: set '{new_name}'{in_unit} instead")
+        self.name, self.value, self.allowed = name, value, f"named '{new_name}'"
+
+
 class UnknownParameterError(ParameterError):
-    """A parameter that nobody declares."""
+    """A parameter that is not declared."""
 
     def __init__(self, name: str, value: object, known: Iterable[str]) -> None:
         super().__init__(name, value, "no such name, only " + ", ".join(sorted(known)))
@@ -51,7 +60,8 @@ class ParameterSpec:
     """What is known of one parameter beside its value.
 
     `kind` is bool, int, float or str, `is_list` says that the value is a tuple of them. `minimum` and `maximum` are
-    inclusive and hold for every element of a list; `choices` lists the allowed strings.
+    inclusive and hold for every element of a list; `choices` lists the allowed strings. `formerly` is the
+    full name that the parameter had in an earlier release.
     """
 
     name: str
@@ -64,6 +74,7 @@ class ParameterSpec:
     maximum: float | None
     choices: tuple[str, ...] | None
     read_only: bool
+    formerly: str = ""
 
     @property
     def required(self) -> bool:
@@ -119,6 +130,7 @@ def parameter(
     maximum: float | None = None,
     choices: tuple[str, ...] | None = None,
     read_only: bool = False,
+    formerly: str = "",
 ) -> Any:
     """Return a dataclass field that carries a parameter's description; see the module's docstring."""
     metadata = {
@@ -129,6 +141,7 @@ def parameter(
             "maximum": maximum,
             "choices": choices,
             "read_only": read_only,
+            "formerly": formerly,
         }
     }
     return dataclasses.field(default=default, metadata=metadata)
@@ -177,3 +190,14 @@ class Parameters:
         """Return a validated copy with some values changed; unknown names raise ParameterError."""
         current = {spec.name: getattr(self, spec.name) for spec in self.specs()}
         return type(self).from_mapping(current | changes)
+
+
+Groups = tuple[tuple[str, type[Parameters]], ...]
+"""An executable's parameter groups: each class with the prefix of its names, such as ("disparity.", ...)."""
+
+
+def renamed(groups: Groups) -> dict[str, tuple[str, ParameterSpec]]:
+    """Return the former names of an executable's parameters, each with the new full name and its specification."""
+    return {
+        spec.formerly: (prefix + spec.name, spec) for prefix, group in groups for spec in group.specs() if spec.formerly
+    }

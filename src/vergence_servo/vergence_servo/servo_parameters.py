@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vergence_rig.parameters import ParameterError, parameter
+from vergence_rig.parameters import Groups, ParameterError, parameter
 from vergence_servo.drivers.registry import BACKENDS, check_name
 from vergence_servo.servo_head import HeadParameters
 
@@ -59,3 +59,6 @@ class ServoNodeParameters(HeadParameters):
             raise ParameterError("joints", self.joints, "one or more names, each once")
         if len(self.park_rad) != len(self.joints):
             raise ParameterError("park_rad", self.park_rad, f"{len(self.joints)} angles, in the order of joints")
+
+
+GROUPS: Groups = (("", ServoNodeParameters), *((f"{name}.", parameters) for name, (parameters, _) in BACKENDS.items()))

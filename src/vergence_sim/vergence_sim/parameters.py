@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vergence_rig.parameters import ParameterError, Parameters, parameter
+from vergence_rig.parameters import Groups, ParameterError, Parameters, parameter
 
 TARGETS = ("cube", "marker")
 DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
@@ -159,3 +159,6 @@ class SimParameters(Parameters):
             right_pitch_rad=0.0,
             distortion=(0.0, 0.0, 0.0, 0.0, 0.0),
         )
+
+
+GROUPS: Groups = (("", SimParameters),)

@@ -16,7 +16,7 @@ from vergence_camera.errors import CameraError, CorruptFrameError
 from vergence_camera.frame import Encoding, Frame
 from vergence_camera.health import Health
 from vergence_camera.pair import Eye
-from vergence_camera.parameters import CameraParameters
+from vergence_camera.parameters import GROUPS, CameraParameters
 from vergence_camera.pixels import decode, encode_jpeg
 from vergence_camera.ros.calibration_service import NodeCalibration
 from vergence_camera.ros.camera_controls import PREFIX, NodeControls
@@ -42,7 +42,7 @@ class CameraNode(Node):
         self._tree = tree or SystemTree()
         self._port = ControlPort(lambda text: self._say(text, True))
         self._controls = NodeControls(self, self._port)
-        self._settings = declare(self, CameraParameters, allow_prefixes=(PREFIX,))
+        self._settings = declare(self, GROUPS, allow_prefixes=(PREFIX,))
         settings: CameraParameters = self._settings.value
         eye = self.get_namespace().rpartition("/")[2]
         self._frame_id = settings.frame_id or f"{eye}_camera_optical_frame".lstrip("_")

@@ -1,7 +1,6 @@
 """gaze_controller_node: steers the eyes by what the metric nodes say, and answers gaze/look_at."""
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,26 +24,15 @@ from vergence_gaze.control.report import Command
 from vergence_gaze.estimation.observations import Observation, PointSighting
 from vergence_gaze.goals.goal import Outcome, Result
 from vergence_gaze.joints.frames import FrameError
-from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.parameters import GROUPS, GazeNodeParameters
 from vergence_gaze.ros import gaze_messages as convert
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack, VergenceError
 from vergence_rig.camera import CameraError, CameraModel
-from vergence_rig.parameters import parameter
 from vergence_rig.rig import load_rig
 
 _FEEDBACK_EVERY = 10
 _MARKERS_EVERY = 10
-
-
-@dataclass(frozen=True)
-class GazeNodeParameters(GazeParameters):
-    """The controller's parameters and the node's own."""
-
-    rig: str = parameter("", "path of rig.yaml; empty for the built-in rig", read_only=True)
-    control_rate_hz: float = parameter(
-        50.0, "control cycles a second", unit="Hz", minimum=5, maximum=1000, read_only=True
-    )
 
 
 class GazeControllerNode(Node):
@@ -52,7 +40,7 @@ class GazeControllerNode(Node):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__("gaze_controller_node", **node_options)
-        self._settings = declare(self, GazeNodeParameters)
+        self._settings = declare(self, GROUPS)
         values: GazeNodeParameters = self._settings.value
         self._rig = load_rig(values.rig)
         self._left, self._right = CameraModel(self._rig.left_camera), CameraModel(self._rig.right_camera)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from vergence_metric.pairs.stereo_parameters import StereoParameters
-from vergence_rig.parameters import ParameterError, Parameters, parameter
+from vergence_rig.parameters import Groups, ParameterError, Parameters, parameter
 
 LAYOUTS = ("auto", "yolov6", "yolov6_end_to_end", "yolov6_ort", "yolov5", "yolov8", "yolov10", "yolox")
 DEVICES = ("cpu", "cuda", "tensorrt", "openvino", "coreml", "directml")
@@ -162,3 +162,6 @@ class BoxMetricNodeParameters(BoxMetricParameters, DetectorParameters, StereoPar
         """Hold every part to its own rules."""
         for part in (BoxMetricParameters, DetectorParameters, StereoParameters):
             part.check(self)
+
+
+GROUPS: Groups = (("", BoxMetricNodeParameters),)

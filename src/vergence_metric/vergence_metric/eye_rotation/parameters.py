@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from vergence_metric.pairs.stereo_parameters import StereoParameters
-from vergence_rig.parameters import Parameters, parameter
+from vergence_rig.parameters import Groups, Parameters, parameter
 
 
 @dataclass(frozen=True)
@@ -79,3 +79,6 @@ class EyeRotationNodeParameters(EncoderParameters, StereoParameters):
         """Hold every part to its own rules."""
         for part in (EncoderParameters, StereoParameters):
             part.check(self)
+
+
+GROUPS: Groups = (("", EyeRotationNodeParameters),)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from vergence_metric.disparity.parameters import DisparityParameters, TrackerParameters
 from vergence_metric.edges.parameters import EdgeMetricParameters
 from vergence_metric.pairs.stereo_parameters import StereoParameters
+from vergence_rig.parameters import Groups
 
 
 @dataclass(frozen=True)
@@ -15,3 +16,6 @@ class EdgeMetricNodeParameters(TrackerParameters, DisparityParameters, EdgeMetri
         """Hold every part to its own rules."""
         for part in (TrackerParameters, DisparityParameters, EdgeMetricParameters, StereoParameters):
             part.check(self)
+
+
+GROUPS: Groups = (("", EdgeMetricNodeParameters),)

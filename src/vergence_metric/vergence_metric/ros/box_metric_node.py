@@ -16,7 +16,7 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_metric.boxes import BoxMeasurement, BoxVergenceResult, DetectorError, draw
-from vergence_metric.boxes.parameters import BoxMetricNodeParameters
+from vergence_metric.boxes.parameters import GROUPS, BoxMetricNodeParameters
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.ros.box_messages import (
     box_vergence_message,
@@ -38,7 +38,7 @@ class BoxMetricNode(PairNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("box_metric_node", **options)
-        self._settings = declare(self, BoxMetricNodeParameters)
+        self._settings = declare(self, GROUPS)
         settings: BoxMetricNodeParameters = self._settings.value
         cv2.setNumThreads(settings.threads or -1)
         rig = load_rig(settings.rig)

@@ -15,7 +15,7 @@ from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.measurement.overlay import draw_overlay
 from vergence_metric.measurement.pair_measurement import Models, PairMeasurement
-from vergence_metric.measurement.parameters import EdgeMetricNodeParameters
+from vergence_metric.measurement.parameters import GROUPS, EdgeMetricNodeParameters
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.viewing_angles import angular_disparity
 from vergence_metric.ros.metric_messages import edge_message, error_message, track_message
@@ -32,7 +32,7 @@ class EdgeMetricNode(PairNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("edge_metric_node", **options)
-        self._settings = declare(self, EdgeMetricNodeParameters)
+        self._settings = declare(self, GROUPS)
         settings: EdgeMetricNodeParameters = self._settings.value
         cv2.setNumThreads(settings.threads or -1)
         self._measurement = PairMeasurement(settings, load_rig(settings.rig))

@@ -12,7 +12,7 @@ from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_metric.eye_rotation.encoder import VisualEncoder
 from vergence_metric.eye_rotation.pair_choice import PairChoice
-from vergence_metric.eye_rotation.parameters import EyeRotationNodeParameters
+from vergence_metric.eye_rotation.parameters import GROUPS, EyeRotationNodeParameters
 from vergence_metric.eye_rotation.resting_pairs import measure_pair
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.ros.metric_messages import eye_rotation_message
@@ -27,7 +27,7 @@ class EyeRotationNode(PairNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("eye_rotation_node", **options)
-        self._settings = declare(self, EyeRotationNodeParameters)
+        self._settings = declare(self, GROUPS)
         settings: EyeRotationNodeParameters = self._settings.value
         cv2.setNumThreads(settings.threads or -1)
         self._rig = load_rig(settings.rig)

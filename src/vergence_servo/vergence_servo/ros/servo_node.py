@@ -37,7 +37,7 @@ from vergence_servo.ros import servo_messages as convert
 from vergence_servo.servo_channel import ServoChannel
 from vergence_servo.servo_head import Mode, ServoHead
 from vergence_servo.servo_health import CommandCounts, Health, channel_health, commands_health, head_health
-from vergence_servo.servo_parameters import ServoNodeParameters
+from vergence_servo.servo_parameters import GROUPS, ServoNodeParameters
 from vergence_servo.trajectory import Trajectory, check_end, start_delay_s
 
 COMMAND_TOPICS = ("joint_command", "~/commands", "joint_trajectory")
@@ -48,8 +48,7 @@ class ServoNode(Node):
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__("servo_node", **node_options)
-        groups = [(f"{name}.", parameters) for name, (parameters, _) in BACKENDS.items()]
-        self._settings = declare(self, ServoNodeParameters, *groups)
+        self._settings = declare(self, GROUPS)
         values: ServoNodeParameters = self._settings.value
         servos = load_servos(values.servos)
         rig = load_rig(values.rig)

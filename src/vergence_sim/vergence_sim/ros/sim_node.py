@@ -23,7 +23,7 @@ from vergence_common.stamps import to_stamp
 from vergence_msgs.msg import TrueBoxes, TrueVergence
 from vergence_rig.rig import JOINT_NAMES, load_rig
 from vergence_sim.head import CommandError
-from vergence_sim.parameters import SimParameters
+from vergence_sim.parameters import GROUPS, SimParameters
 from vergence_sim.real_time import Event, Schedule
 from vergence_sim.ros.sim_messages import camera_info, joint_state, true_boxes, true_vergence
 from vergence_sim.simulator import Simulator, TargetError
@@ -41,7 +41,7 @@ class SimNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("sim_node", **options)
-        settings = declare(self, SimParameters)
+        settings = declare(self, GROUPS)
         parameters: SimParameters = settings.value
         self._rig = load_rig(parameters.rig)
         self._settings = parameters
