@@ -15,7 +15,7 @@ parameter descriptors) and the shipped YAML (a test holds it equal to the defaul
 import dataclasses
 import math
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -128,11 +128,14 @@ def parameter(
     unit: str = "",
     minimum: float | None = None,
     maximum: float | None = None,
-    choices: tuple[str, ...] | None = None,
+    choices: tuple[str, ...] | Callable[[], tuple[str, ...]] | None = None,
     read_only: bool = False,
     formerly: str = "",
 ) -> Any:
-    """Return a dataclass field that carries a parameter's description; see the module's docstring."""
+    """Return a dataclass field that carries a parameter's description; see the module's docstring.
+
+    `choices` may be a function, called at each validation: the names of a registry that others may add to.
+    """
     metadata = {
         _KEY: {
             "description": description,
@@ -174,7 +177,10 @@ class Parameters:
             kind, is_list = hints[field.name], False
             if typing.get_origin(kind) is tuple:
                 kind, is_list = typing.get_args(kind)[0], True
-            specs.append(ParameterSpec(field.name, kind, is_list, field.default, **field.metadata[_KEY]))
+            known = dict(field.metadata[_KEY])
+            if callable(known["choices"]):
+                known["choices"] = known["choices"]()
+            specs.append(ParameterSpec(field.name, kind, is_list, field.default, **known))
         return tuple(specs)
 
     @classmethod
