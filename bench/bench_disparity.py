@@ -12,9 +12,8 @@ from skimage.registration import phase_cross_correlation
 from bench.fovea_scenes import scenes
 from bench.harness import Row
 from bench.textured_pairs import Pair, clean, deceptive, hard
-from vergence_metric.disparity import make_estimator
+from vergence_metric.disparity import estimator_names, make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
-from vergence_metric.disparity.registry import names
 
 Image = NDArray[np.uint8]
 Point = tuple[float, float]
@@ -34,7 +33,7 @@ def run(say: Callable[[str], None]) -> list[Row]:
     try:
         rows: list[Row] = []
         for condition, cases in _conditions():
-            say(f"{condition}: {names()} and peers")
+            say(f"{condition}: {estimator_names()} and peers")
             rows += _accuracy(condition, cases)
         say(f"{_DECEPTIVE} pairs without an answer")
         return rows + _deceived()
@@ -61,7 +60,7 @@ def _accuracy(condition: str, cases: list[tuple[Image, Image, Point, float]]) ->
     }
     peer = min(peers, key=lambda name: peers[name])
     rows = [Row(f"disparity.peer.{name.split()[-1]}.{condition}", value, "px RMS") for name, value in peers.items()]
-    for name in names():
+    for name in estimator_names():
         estimator = make_estimator(DisparityParameters(disparity_estimator=name))
         started = time.perf_counter()
         answers = [estimator.estimate(left, right, point) for left, right, point, _ in cases]

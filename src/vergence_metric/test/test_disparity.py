@@ -6,9 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence_metric.disparity import DisparityInputError, DisparityStatus, make_estimator
-from vergence_metric.disparity.parameters import ESTIMATORS, DisparityParameters
-from vergence_metric.disparity.registry import names
+from vergence_metric.disparity import (
+    Disparity,
+    DisparityEstimator,
+    DisparityInputError,
+    DisparityStatus,
+    estimator_names,
+    make_estimator,
+    register_estimator,
+    registry,
+)
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_rig.parameters import ParameterError
 
 WIDTH, HEIGHT = 640, 480
@@ -39,7 +47,7 @@ def estimator(name="affine", **changes):
     return make_estimator(DisparityParameters(disparity_estimator=name, **changes))
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", estimator_names())
 @pytest.mark.parametrize("shift_px", [-131.37, -9.5, 0.0, 3.25, 57.8, 148.6])
 def test_a_shift_is_found(name, shift_px):
     surface = texture(1)
@@ -52,7 +60,7 @@ def test_a_shift_is_found(name, shift_px):
     assert answer.point_px == ((WIDTH - 1) / 2, (HEIGHT - 1) / 2)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", estimator_names())
 def test_noise_gain_roll_and_vertical_offset_together(name):
     surface = texture(2)
     left = view(surface, noise=8.0, seed=3)
@@ -139,8 +147,54 @@ def test_bad_input_is_named(left, right, point, words):
         estimator().estimate(left, right, point)
 
 
-def test_every_name_is_known():
-    assert set(names()) == set(ESTIMATORS)
+class RowSearch(DisparityEstimator):
+    """An estimator with its own search: the shift of the point's row with the least absolute difference."""
+
+    name = "row_search"
+
+    def __init__(self, parameters):
+        self._max_px = parameters.disparity_max_px
+
+    def estimate_at(self, left, right, point_px, expected_px):
+        x, y = round(point_px[0]), round(point_px[1])
+        window = left[y, x - 20 : x + 21].astype(int)
+        shifts = range(-self._max_px, self._max_px + 1)
+        costs = [np.abs(right[y, x - d - 20 : x - d + 21].astype(int) - window).sum() for d in shifts]
+        best = float(shifts[int(np.argmin(costs))])
+        return Disparity(best, 0.0, 0.3, 0.9, DisparityStatus.OK, "", self.name, point_px)
+
+
+@pytest.fixture
+def row_search(monkeypatch):
+    monkeypatch.setattr(registry, "_BUILDERS", dict(registry._BUILDERS))
+    register_estimator(RowSearch.name, RowSearch)
+
+
+def test_an_estimator_with_its_own_search_can_be_registered(row_search):
+    surface = texture(12)
+    answer = estimator("row_search").estimate(view(surface), view(surface, 37.0))
+    assert answer.estimator == "row_search"
+    assert answer.horizontal_px == pytest.approx(37.0)
+    chosen = {spec.name: spec for spec in DisparityParameters.specs()}["disparity_estimator"]
+    assert "row_search" in chosen.choices
+
+
+def test_a_registered_estimator_works_behind_the_depth_policy(row_search):
+    surface = texture(13)
+    answer = estimator("row_search", disparity_depth_policy="largest").estimate(view(surface), view(surface, 37.0))
+    assert answer.estimator == "row_search"
+    assert answer.horizontal_px == pytest.approx(37.0)
+
+
+def test_a_name_is_registered_once(row_search):
+    with pytest.raises(ValueError, match="must be new: got 'row_search'"):
+        register_estimator("row_search", RowSearch)
+
+
+def test_a_name_that_is_not_registered_is_refused():
+    assert "row_search" not in estimator_names()
+    with pytest.raises(ParameterError, match="row_search"):
+        estimator("row_search")
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from vergence_metric.disparity.correlation import radius_of
 from vergence_metric.disparity.fovea_pair import FoveaPair, Strip
-from vergence_metric.disparity.measured import Measured
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
+from vergence_metric.disparity.shared_search import LocalDisparity
 
 _BLUR_PX = 0.9  # linear interpolation is all but exact on what this leaves
 _REMAP_STEPS = 32  # per pixel
@@ -51,10 +51,10 @@ class Fit:
     affine: Matrix
 
 
-def measure_affine(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> Measured | None:
+def measure_affine(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
     """Return the disparity by the affine fit about a match; None where it does not converge."""
     fit = grow(pair, match.horizontal_px, match.vertical_px, match.window_px, parameters)
-    return None if fit is None else Measured(fit.horizontal_px, fit.vertical_px, fit.sigma_px)
+    return None if fit is None else LocalDisparity(fit.horizontal_px, fit.vertical_px, fit.sigma_px)
 
 
 def grow(

@@ -11,16 +11,17 @@ import numpy as np
 
 from vergence_metric.disparity.correlation import parabola
 from vergence_metric.disparity.fovea_pair import FoveaPair
-from vergence_metric.disparity.measured import Measured, measuring_window_px, side_of, tapered, window_about
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
+from vergence_metric.disparity.shared_search import LocalDisparity
+from vergence_metric.disparity.windows import measuring_window_px, side_of, tapered, window_about
 
 _REACH_PX = 6
 _SMALLEST_POWER = 1e-3  # share of the mean power added before the logarithm: noise has no echo
 _ROUNDS = 3
 
 
-def measure_cepstral(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> Measured | None:
+def measure_cepstral(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
     """Return the disparity by the cepstrum about a match; None where its peak is at the edge of what was looked at."""
     sigma = measuring_window_px(match, parameters)
     side = side_of(sigma)
@@ -37,7 +38,7 @@ def measure_cepstral(pair: FoveaPair, match: Match, parameters: DisparityParamet
         d, v = d - step[0], v - step[1]
         if math.hypot(*step) < 0.02:
             break
-    return Measured(d, v, 0.1)
+    return LocalDisparity(d, v, 0.1)
 
 
 def _echo(first: np.ndarray, second: np.ndarray) -> tuple[float, float] | None:

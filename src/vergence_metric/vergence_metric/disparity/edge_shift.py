@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.disparity.fovea_pair import FoveaPair, Grey, Strip
-from vergence_metric.disparity.measured import Measured, measuring_window_px
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
+from vergence_metric.disparity.shared_search import LocalDisparity
+from vergence_metric.disparity.windows import measuring_window_px
 
 _TRUNCATION_PX = 4.0
 _BLUR_PX = 1.2
@@ -24,7 +25,7 @@ _FEWEST_EDGES = 12
 _EDGE_SHARE = 0.15  # of the pixels are edges: the threshold follows the texture
 
 
-def measure_edge_shift(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> Measured | None:
+def measure_edge_shift(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
     """Return the disparity by edge distances about a match; None without edges or with the minimum at the rim."""
     sigma = measuring_window_px(match, parameters)
     radius = math.ceil(2.0 * sigma)
@@ -54,7 +55,7 @@ def measure_edge_shift(pair: FoveaPair, match: Match, parameters: DisparityParam
     down = _notch(surface[j - 1, i], surface[j, i], surface[j + 1, i])
     edge_pixels = float((first[inner, inner] * weights).sum())
     sigma_px = float(surface[j, i]) / 2 / math.sqrt(max(edge_pixels / 4, 1.0))
-    return Measured(d + i - _REACH_PX + across, v + j - _REACH_PX + down, sigma_px)
+    return LocalDisparity(d + i - _REACH_PX + across, v + j - _REACH_PX + down, sigma_px)
 
 
 def _edges(strip: Strip, at: tuple[int, int], half: int) -> tuple[Grey, Grey]:

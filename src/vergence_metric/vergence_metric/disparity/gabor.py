@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.disparity.fovea_pair import FoveaPair
-from vergence_metric.disparity.measured import Measured, side_of, window_about
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
+from vergence_metric.disparity.shared_search import LocalDisparity
+from vergence_metric.disparity.windows import side_of, window_about
 
 _WAVELENGTHS_PX = (24.0, 16.0, 11.0, 8.0, 8.0)
 _ORIENTATIONS_RAD = tuple(math.radians(a) for a in (0.0, 30.0, 60.0, 90.0, 120.0, 150.0))
@@ -36,7 +37,7 @@ def _filter(wavelength: float, orientation: float) -> tuple[NDArray[np.float32],
     return wave.real.astype(np.float32), wave.imag.astype(np.float32)
 
 
-def measure_gabor(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> Measured | None:
+def measure_gabor(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
     """Return the disparity by Gabor phases about a match; None where no orientation constrains it across."""
     # Pooled over the window that decided, with no wave that reaches far beyond it.
     sigma = match.window_px
@@ -58,7 +59,7 @@ def measure_gabor(pair: FoveaPair, match: Match, parameters: DisparityParameters
         d, v, spread = d + step[0], v + step[1], step[2]
         if math.hypot(d - match.horizontal_px, v - match.vertical_px) > sigma:
             return None
-    return Measured(d, v, spread)
+    return LocalDisparity(d, v, spread)
 
 
 def _response(window: NDArray[np.float32], wavelength: float, orientation: float) -> NDArray[np.complex128]:

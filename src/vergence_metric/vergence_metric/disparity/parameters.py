@@ -5,9 +5,9 @@ The names are distinct, so that a node can inherit all the sets into one.
 
 from dataclasses import dataclass
 
+from vergence_metric.disparity.registry import estimator_names
 from vergence_rig.parameters import ParameterError, Parameters, parameter
 
-ESTIMATORS = ("affine", "zncc", "edge_shift", "phase", "cepstral", "gabor")
 DEPTH_POLICIES = ("center", "nearest", "largest", "box")
 
 
@@ -15,7 +15,7 @@ DEPTH_POLICIES = ("center", "nearest", "largest", "box")
 class DisparityParameters(Parameters):
     """How the signed disparity at a point of the left image is found."""
 
-    disparity_estimator: str = parameter("affine", "which estimator answers", choices=ESTIMATORS)
+    disparity_estimator: str = parameter("affine", "which estimator answers", choices=estimator_names)
     disparity_depth_policy: str = parameter(
         "center", "whose disparity counts where several depths are in view", choices=DEPTH_POLICIES
     )
@@ -56,10 +56,10 @@ class DisparityParameters(Parameters):
         super().check()
         windows = self.disparity_windows_px
         if not windows or list(windows) != sorted(set(windows)):
-            raise ParameterError("disparity_windows_px", windows, "at least one, strictly increasing")
+            raise ParameterError("disparity_windows_px", windows, "a strictly increasing list of one or more windows")
         box = self.disparity_box_px
         if box and (len(box) != 4 or box[0] >= box[2] or box[1] >= box[3]):
-            raise ParameterError("disparity_box_px", box, "empty, or x_min, y_min, x_max, y_max in that order")
+            raise ParameterError("disparity_box_px", box, "empty, or the four numbers x_min, y_min, x_max, y_max in that order")
         if self.disparity_depth_policy == "box" and not box:
             raise ParameterError("disparity_box_px", box, "a box, because disparity_depth_policy is 'box'")
 

@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.disparity.fovea_pair import FoveaPair
-from vergence_metric.disparity.measured import Measured, measuring_window_px, side_of, tapered, window_about
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match
+from vergence_metric.disparity.shared_search import LocalDisparity
+from vergence_metric.disparity.windows import measuring_window_px, side_of, tapered, window_about
 
 _ROUNDS = 3
 _BAND = 0.25  # cycles per pixel; above, aliasing and noise
 _WHITENING = 0.02  # share of the mean power below which a frequency counts less
 
 
-def measure_phase(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> Measured | None:
+def measure_phase(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
     """Return the disparity by phase about a match; None where the two windows share no power."""
     sigma = measuring_window_px(match, parameters)
     side = side_of(sigma)
@@ -37,7 +38,7 @@ def measure_phase(pair: FoveaPair, match: Match, parameters: DisparityParameters
         d, v, spread = d + step[0], v + step[1], step[2]
         if math.hypot(d - match.horizontal_px, v - match.vertical_px) > sigma:
             return None
-    return Measured(d, v, spread)
+    return LocalDisparity(d, v, spread)
 
 
 def _shift(cross: NDArray[np.complex128]) -> tuple[float, float, float] | None:

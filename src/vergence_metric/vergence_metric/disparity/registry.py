@@ -1,35 +1,30 @@
-"""Estimators by name."""
+"""Disparity estimators by name. `register_estimator` adds one; the parameter `disparity.estimator` chooses one.
 
-from vergence_metric.disparity.affine import measure_affine
-from vergence_metric.disparity.cepstral import measure_cepstral
-from vergence_metric.disparity.depth_policy import DepthPolicyEstimator
-from vergence_metric.disparity.edge_shift import measure_edge_shift
-from vergence_metric.disparity.gabor import measure_gabor
-from vergence_metric.disparity.measured import Measure, MeasuredEstimator
-from vergence_metric.disparity.parameters import DisparityParameters
-from vergence_metric.disparity.phase import measure_phase
+This module imports no parameters, because the parameters take the allowed names from here.
+"""
+
+from collections.abc import Callable
+
 from vergence_metric.disparity.protocol import DisparityEstimator
-from vergence_metric.disparity.zncc import measure_zncc
 
-_MEASURES: dict[str, Measure] = {
-    "affine": measure_affine,
-    "zncc": measure_zncc,
-    "edge_shift": measure_edge_shift,
-    "phase": measure_phase,
-    "cepstral": measure_cepstral,
-    "gabor": measure_gabor,
-}
+EstimatorBuilder = Callable[..., DisparityEstimator]
+"""Called with the DisparityParameters; returns an estimator. The class of an estimator is one."""
+
+_BUILDERS: dict[str, EstimatorBuilder] = {}
 
 
-def names() -> tuple[str, ...]:
-    """Return the names of all estimators."""
-    return tuple(_MEASURES)
+def register_estimator(name: str, build: EstimatorBuilder) -> None:
+    """Add an estimator under a name that is free; raises ValueError for one in use."""
+    if name in _BUILDERS:
+        raise ValueError(f"the name of a disparity estimator must be new: got {name!r}, which is registered")
+    _BUILDERS[name] = build
 
 
-def make_estimator(parameters: DisparityParameters) -> DisparityEstimator:
-    """Return the estimator that `parameters.disparity_estimator` names, behind the depth policy."""
-    name = parameters.disparity_estimator
-    estimator = MeasuredEstimator(name, _MEASURES[name], parameters)
-    if parameters.disparity_depth_policy == "center":
-        return estimator
-    return DepthPolicyEstimator(estimator, parameters)
+def estimator_names() -> tuple[str, ...]:
+    """Return the names of all registered estimators, in order of registration."""
+    return tuple(_BUILDERS)
+
+
+def estimator_builder(name: str) -> EstimatorBuilder:
+    """Return the builder of an estimator; raises KeyError for a name that is not registered."""
+    return _BUILDERS[name]

@@ -2,14 +2,15 @@
 
 from vergence_metric.disparity.correlation import correlate
 from vergence_metric.disparity.fovea_pair import FoveaPair
-from vergence_metric.disparity.measured import Measured, measuring_window_px
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.search import Match, deviation_px
+from vergence_metric.disparity.shared_search import LocalDisparity
+from vergence_metric.disparity.windows import measuring_window_px
 
 _REACH_PX = 3
 
 
-def measure_zncc(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> Measured | None:
+def measure_zncc(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
     """Return the parabola's peak of the correlation at full resolution, None if it lies at the rim."""
     left, right = pair.full
     at = (round(pair.point_px[0]), round(pair.point_px[1]))
@@ -21,4 +22,4 @@ def measure_zncc(pair: FoveaPair, match: Match, parameters: DisparityParameters)
     if not (0 < i < columns - 1 and 0 < j < rows - 1):
         return None
     horizontal, vertical = surface.subpixel(i, j)
-    return Measured(horizontal, vertical, deviation_px(surface, value))
+    return LocalDisparity(horizontal, vertical, deviation_px(surface, value))
