@@ -1,0 +1,112 @@
+"""A rectified pair of photographs with the camera matrix that is assumed for both, and the points whose depth is known.
+
+Any matrix is consistent: another one shows a projectively changed scene, in which both eyes still agree.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.geometry import EyeAngles
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.uint8]
+
+FOCAL_PER_WIDTH = 0.85
+"""Focal length over image width that is assumed where none is given: a webcam's, about 61 degrees wide."""
+
+
+class PhotoError(ValueError):
+    """Photographs or points that cannot serve as a world."""
+
+
+@dataclass(frozen=True)
+class PhotoPoint:
+    """A pixel (x, y) of the left photograph and its disparity x_left - x_right [px]."""
+
+    x_px: float
+    y_px: float
+    disparity_px: float
+
+
+class PhotoPair:
+    """Both photographs (h, w, 3) BGR and their common camera: one focal length and principal point [px]."""
+
+    def __init__(
+        self,
+        left: Image,
+        right: Image,
+        fx_px: float = 0.0,
+        cx_px: float | None = None,
+        cy_px: float | None = None,
+    ) -> None:
+        """Take photographs of one size; `fx_px` 0 is 0.85 of the width, no principal point is the picture's centre."""
+        for name, image in (("left", left), ("right", right)):
+            if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
+                raise PhotoError(f"the {name} photograph must be (h, w, 3) uint8: got {image.shape} {image.dtype}")
+        if left.shape != right.shape:
+            raise PhotoError(
+                f"both photographs must have one size: left is {_size(left)}, right is {_size(right)} px. "
+                "Only a rectified pair, cut alike, is a world"
+            )
+        self.left, self.right = left, right
+        self.height_px, self.width_px = left.shape[:2]
+        self.fx_px = fx_px if fx_px > 0 else FOCAL_PER_WIDTH * self.width_px
+        self.cx_px = 0.5 * (self.width_px - 1) if cx_px is None else cx_px
+        self.cy_px = 0.5 * (self.height_px - 1) if cy_px is None else cy_px
+
+    @property
+    def matrix(self) -> Array:
+        """The camera matrix (3, 3)."""
+        return np.array([[self.fx_px, 0.0, self.cx_px], [0.0, self.fx_px, self.cy_px], [0.0, 0.0, 1.0]])
+
+    def rays(self, point: PhotoPoint) -> tuple[Array, Array]:
+        """Return the directions (3,), (3,) in rig_base in which the left and the right eye see a point."""
+        y = (point.y_px - self.cy_px) / self.fx_px
+        left, right = ((x - self.cx_px) / self.fx_px for x in (point.x_px, point.x_px - point.disparity_px))
+        # Straight ahead, an eye's optical frame (x right, y down, z forward) is rig_base's (-y, -z, x).
+        return np.array([1.0, -left, -y]), np.array([1.0, -right, -y])
+
+    def fixation(self, point: PhotoPoint) -> EyeAngles:
+        """Return the angles that bring a point to both foveas: of its two rays, which share one tilt."""
+        (_, left, up), (_, right, _) = (ray.tolist() for ray in self.rays(point))
+        forward = math.hypot(1.0, up)
+        return EyeAngles(math.atan2(left, forward), math.atan2(right, forward), math.atan2(-up, 1.0))
+
+    def check(self, point: PhotoPoint) -> None:
+        """Raise PhotoError for a point outside either photograph."""
+        right_x = point.x_px - point.disparity_px
+        inside = 0 <= point.x_px <= self.width_px - 1 and 0 <= point.y_px <= self.height_px - 1
+        if not (inside and 0 <= right_x <= self.width_px - 1):
+            raise PhotoError(
+                f"a point must lie inside both photographs of {self.width_px}x{self.height_px} px: got "
+                f"x {point.x_px:g}, y {point.y_px:g}, disparity {point.disparity_px:g} (x {right_x:g} in the right one)"
+            )
+
+
+def read_pair(
+    left: str | Path, right: str | Path, fx_px: float = 0.0, cx_px: float | None = None, cy_px: float | None = None
+) -> PhotoPair:
+    """Read two picture files; raises PhotoError for one that cannot be read, or for two sizes."""
+    return PhotoPair(_read("left", left), _read("right", right), fx_px, cx_px, cy_px)
+
+
+def _read(side: str, path: str | Path) -> Image:
+    if not str(path):
+        raise PhotoError(f"the {side} photograph must be given: set the parameter '{side}' to the path of a picture")
+    try:
+        encoded = np.frombuffer(Path(path).read_bytes(), np.uint8)
+    except OSError as error:
+        raise PhotoError(f"the {side} photograph '{path}' cannot be read: {error.strerror or error}") from error
+    image = cv2.imdecode(encoded, cv2.IMREAD_COLOR) if encoded.size else None
+    if image is None:
+        raise PhotoError(f"the {side} photograph '{path}' is not a picture that OpenCV can decode")
+    return np.asarray(image, np.uint8)
+
+
+def _size(image: Image) -> str:
+    return f"{image.shape[1]}x{image.shape[0]}"

@@ -1,0 +1,110 @@
+"""One eye's view of its photograph: the exact homography of a rotation about the optical centre.
+
+A view shows the photograph where the photograph reaches. Beyond its frame there is nothing true to show: its border
+pixels go on, blurred the more the farther they are from it, and fade to its mean colour. So the frame itself makes no
+edge; `outside_share` says how much of a view is such padding.
+"""
+
+import math
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.geometry import ROTATION_EYE_FROM_OPTICAL, rotation_rig_from_eye
+from vergence_sim.optics import Lens
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.uint8]
+
+_MARGIN_PX = 160
+_BLUR_PX = (3.0, 12.0, 40.0)
+_PHOTO_FROM_RIG = ROTATION_EYE_FROM_OPTICAL.T
+
+
+def mount_rotation(roll_rad: float, pitch_rad: float) -> Array:
+    """Return how a camera is turned in its mount (3, 3), in the eye's frame: rolled about x, then pitched about y."""
+    cos_roll, sin_roll = math.cos(roll_rad), math.sin(roll_rad)
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, cos_roll, -sin_roll], [0.0, sin_roll, cos_roll]])
+    return roll @ rotation_rig_from_eye(0.0, pitch_rad)
+
+
+class PhotoEye:
+    """Warps one photograph to what an eye sees of it, and points to where it sees them.
+
+    Args:
+        photograph: (h, w, 3) BGR.
+        matrix: (3, 3) camera matrix of the photograph.
+        lens: the eye's camera; it distorts the view.
+        mount: (3, 3) rotation of the camera in its mount.
+    """
+
+    def __init__(self, photograph: Image, matrix: Array, lens: Lens, mount: Array) -> None:
+        self._height, self._width = photograph.shape[:2]
+        self._padded, self._beyond = _padded(photograph)
+        self._lens, self._mount = lens, mount
+        self._matrix = matrix
+        shift = np.array([[1.0, 0.0, _MARGIN_PX], [0.0, 1.0, _MARGIN_PX], [0.0, 0.0, 1.0]])
+        self._padded_from_rig = shift @ matrix @ _PHOTO_FROM_RIG
+        camera = lens.camera
+        self._size = camera.width_px, camera.height_px
+        focal = lens.render_focal_px
+        # The lens takes a pinhole view about the image's own centre, a little wider than the camera's.
+        self._rays_of_view = np.linalg.inv(
+            np.array([[focal, 0, 0.5 * (camera.width_px - 1)], [0, focal, 0.5 * (camera.height_px - 1)], [0, 0, 1]])
+        )
+
+    def view(self, pan_rad: float, tilt_rad: float) -> Image:
+        """Return the pinhole view (h, w, 3) at these angles [rad], before the lens distorts it."""
+        homography = self._padded_from_rig @ self._rig_from_optical(pan_rad, tilt_rad) @ self._rays_of_view
+        return np.asarray(
+            cv2.warpPerspective(
+                self._padded,
+                homography,
+                self._size,
+                flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+                borderMode=cv2.BORDER_CONSTANT,
+                borderValue=self._beyond,
+            ),
+            np.uint8,
+        )
+
+    def outside_share(self, pan_rad: float, tilt_rad: float) -> float:
+        """Return the share of the image at these angles [rad] that lies outside the photograph."""
+        across, down = np.meshgrid(np.linspace(0, self._size[0] - 1, 49), np.linspace(0, self._size[1] - 1, 33))
+        pixels = np.stack([across.ravel(), down.ravel(), np.ones(across.size)])
+        rays = self._rig_from_optical(pan_rad, tilt_rad) @ self._rays_of_view @ pixels
+        x, y, depth = self._matrix @ _PHOTO_FROM_RIG @ rays
+        x, y = x / depth, y / depth
+        inside = (depth > 0) & (x >= 0) & (x <= self._width - 1) & (y >= 0) & (y <= self._height - 1)
+        return 1.0 - float(inside.mean())
+
+    def project(self, ray: Array, pan_rad: float, tilt_rad: float) -> tuple[float, float]:
+        """Return the pixel (x, y), as the lens distorts it, at which a direction (3,) is seen; NaN behind the eye."""
+        x, y, depth = (self._rig_from_optical(pan_rad, tilt_rad).T @ ray).tolist()
+        if depth <= 1e-9:
+            return math.nan, math.nan
+        camera = self._lens.camera
+        ideal = camera.fx_px * x / depth + camera.cx_px, camera.fy_px * y / depth + camera.cy_px
+        return self._lens.distorted(ideal)
+
+    def _rig_from_optical(self, pan_rad: float, tilt_rad: float) -> Array:
+        return rotation_rig_from_eye(pan_rad, tilt_rad) @ self._mount @ ROTATION_EYE_FROM_OPTICAL
+
+
+def _padded(photograph: Image) -> tuple[Image, tuple[float, ...]]:
+    """Return the photograph with a margin that makes no edge at its frame, and the colour beyond the margin."""
+    mean = photograph.reshape(-1, 3).mean(axis=0)
+    margins = (_MARGIN_PX,) * 4
+    grown = cv2.copyMakeBorder(photograph, *margins, cv2.BORDER_REPLICATE)
+    inside = np.zeros(grown.shape[:2], np.uint8)
+    inside[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX] = 1
+    away = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)[:, :, None] / _MARGIN_PX
+    faded = grown.astype(np.float32)
+    for step, sigma in enumerate(_BLUR_PX):
+        share = np.clip((away - 0.02 * step) / (0.06 + 0.1 * step), 0.0, 1.0)
+        faded += share * (cv2.GaussianBlur(faded, (0, 0), sigma) - faded)
+    faded += np.clip(away, 0.0, 1.0) ** 2 * (mean - faded)
+    padded = np.rint(faded).astype(np.uint8)
+    padded[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX] = photograph
+    return padded, tuple(mean.tolist())
