@@ -1,0 +1,114 @@
+"""The pairs of photographs that the benchmark looks at, and the points on them whose disparity is known."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.rig import Rig, default_rig
+from vergence_sim.photo.pair import PhotoPair, PhotoPoint, read_pair
+from vergence_sim.photo.world import cropped
+
+Image = npt.NDArray[np.uint8]
+
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "photographs"
+VIEW_PX = 480, 320
+LIT_DIFFERENTLY = "PianoL"
+_ETH3D_FOCAL_PX = 542.0
+
+
+class NoPhotographsError(ValueError):
+    """The photographs are not on this machine."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A point to click on, by the name of its pair."""
+
+    pair: str
+    point: PhotoPoint
+
+
+def photographs_rig() -> Rig:
+    """Return the shipped rig with its images cut to what a photograph fills at most poses."""
+    return cropped(default_rig(), *VIEW_PX)
+
+
+@lru_cache(maxsize=1)
+def _described() -> Mapping[str, Mapping[str, object]]:
+    try:
+        described: Mapping[str, Mapping[str, object]] = json.loads((DATA / "targets.json").read_text(encoding="utf-8"))
+    except OSError as error:
+        raise NoPhotographsError(f"no photographs to look at: '{DATA}' cannot be read: {error.strerror}") from error
+    return described
+
+
+def pair_names() -> list[str]:
+    """Return the names of all pairs; raises NoPhotographsError where there are none."""
+    return sorted(_described())
+
+
+def targets(name: str, count: int) -> list[Target]:
+    """Return up to `count` targets of a pair, spread over the list of those that were prepared."""
+    listed = _described()[name]["targets"]
+    assert isinstance(listed, list)
+    count = min(count, len(listed))
+    chosen = [listed[math.floor(i * len(listed) / count)] for i in range(count)]
+    return [Target(name, PhotoPoint(t["x_px"], t["y_px"], t["disparity_px"])) for t in chosen]
+
+
+@lru_cache(maxsize=2)
+def pair_of(name: str) -> PhotoPair:
+    """Return a pair with the camera that is natural for its source."""
+    focal_px = _ETH3D_FOCAL_PX if _described()[name]["source"] == "ETH3D" else 0.0
+    return read_pair(DATA / f"{name}_left.jpg", DATA / f"{name}_right.jpg", focal_px)
+
+
+@dataclass(frozen=True)
+class KnownPoint:
+    """A point (x, y) of a grey pair with its disparity [px]; `exact` tells measured truth from matched."""
+
+    pair: str
+    x_px: float
+    y_px: float
+    disparity_px: float
+    exact: bool
+
+
+def grey_pair(name: str) -> tuple[Image, Image]:
+    """Return a pair in grey; "stereo_motorcycle" is scikit-image's, whose disparity was measured by structured light."""
+    if name == "stereo_motorcycle":
+        left, right, _ = _motorcycle()
+        greys = [cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY) for image in (left, right)]
+    else:
+        pair = pair_of(name)
+        greys = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in (pair.left, pair.right)]
+    return np.asarray(greys[0], np.uint8), np.asarray(greys[1], np.uint8)
+
+
+def motorcycle_points(count: int, seed: int) -> list[KnownPoint]:
+    """Return points drawn evenly from where scikit-image's pair has its disparity and both images show the place."""
+    _, _, disparity = _motorcycle()
+    height, width = disparity.shape
+    rng = np.random.default_rng(seed)
+    points: list[KnownPoint] = []
+    while len(points) < count:
+        x, y = int(rng.integers(20, width - 20)), int(rng.integers(20, height - 20))
+        value = float(disparity[y, x])
+        if math.isfinite(value) and x - value > 20:
+            points.append(KnownPoint("stereo_motorcycle", x, y, value, exact=True))
+    return points
+
+
+@lru_cache(maxsize=1)
+def _motorcycle() -> tuple[Image, Image, npt.NDArray[np.float32]]:
+    from skimage.data import stereo_motorcycle
+
+    left, right, disparity = stereo_motorcycle()
+    return left, right, disparity

@@ -1,0 +1,236 @@
+"""The shipped metric and controller before a pair of photographs, in simulated time: no nodes, no sleeping.
+
+Images, joint reports and results take as long as through the running nodes: `camera.latency_s` from an exposure to its
+publication, `processing_s` for the metric, 2 ms for a joint report. What passes between metric and controller goes
+through the same messages as between their nodes.
+"""
+
+import heapq
+import itertools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from std_msgs.msg import Header
+
+from vergence_common.stamps import to_stamp
+from vergence_gaze.control.controller import GazeController
+from vergence_gaze.estimation.observations import JointReport, Observation
+from vergence_gaze.goals.goal import Goal, GoalKind
+from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.ros import gaze_messages
+from vergence_metric.measurement.pair_measurement import PairMeasurement
+from vergence_metric.measurement.parameters import EdgeMetricNodeParameters
+from vergence_metric.pairs.joint_history import JointHistory
+from vergence_metric.pairs.viewing_angles import angular_disparity
+from vergence_metric.ros import metric_messages
+from vergence_rig.camera import CameraModel
+from vergence_rig.rig import JOINT_NAMES, Rig
+from vergence_sim.optics import Lens
+from vergence_sim.photo.pair import PhotoPoint
+from vergence_sim.photo.world import EYES, PhotoWorld
+from vergence_sim.real_time import Schedule
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.uint8]
+
+CONTROL_PERIOD_S = 0.02
+PROCESSING_S = 0.030
+JOINT_REPORT_S = 0.002
+_LOOK_BACK_NS = 500_000_000
+_CLOCK_START_S = 100.0
+"""Time 0 of the world on the clock of the stamps: a stamp of zero would mean "none"."""
+
+
+@dataclass
+class Trace:
+    """One step of control after another since the click: times [s], errors [deg], and what the controller reported."""
+
+    time_s: list[float] = field(default_factory=list)
+    aside_deg: list[float] = field(default_factory=list)
+    vergence_deg: list[float] = field(default_factory=list)
+    verged: list[bool] = field(default_factory=list)
+    phase: list[str] = field(default_factory=list)
+    reason: list[str] = field(default_factory=list)
+    first_result_s: float = math.inf
+    start_errors_rad: tuple[float, float, float] = (math.nan, math.nan, math.nan)
+    outside_share: float = math.nan
+
+    @property
+    def largest_deg(self) -> Array:
+        """The largest of the errors in version, tilt and vergence (n,)."""
+        return np.maximum(np.abs(self.aside_deg), np.abs(self.vergence_deg))
+
+
+class MetricOfPairs:
+    """edge_metric_node's work on a pair, as the observations that gaze_controller_node makes of its messages."""
+
+    def __init__(self, rig: Rig, lenses: Mapping[str, Lens]) -> None:
+        self._measurement = PairMeasurement(EdgeMetricNodeParameters(), rig)
+        left, right = (_model(lenses[eye]) for eye in EYES)
+        self._models = left, right
+        self._joints = JointHistory()
+
+    @property
+    def left_camera(self) -> CameraModel:
+        """The left camera as its camera_info describes it."""
+        return self._models[0]
+
+    def on_joints(self, stamp_s: float, angles_rad: Mapping[str, float]) -> None:
+        """Keep a joint report."""
+        self._joints.add(_ns(stamp_s), list(angles_rad), list(angles_rad.values()))
+
+    def observe(self, left: Image, right: Image, left_stamp_s: float, right_stamp_s: float) -> list[Observation]:
+        """Measure a pair and return what the controller receives of it."""
+        header = Header(stamp=to_stamp(left_stamp_s))
+        skew_s = right_stamp_s - left_stamp_s
+        measurement, models = self._measurement, self._models
+        edge = measurement.edge(left, right)
+        disparity = measurement.disparity(edge)
+        angular = angular_disparity(*models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px)
+        error = metric_messages.error_message(disparity, angular, header, skew_s)
+        verged = measurement.verged(edge, error.horizontal_px, error.confidence)
+        edges = metric_messages.edge_message(edge, verged, header, skew_s)
+        now_ns = _ns(left_stamp_s)
+        eyes = self._joints.at(now_ns, _ns(right_stamp_s))
+        passed = self._joints.told_between(now_ns - _LOOK_BACK_NS, now_ns)
+        track = measurement.track(edge, left_stamp_s, eyes, models, [(ns * 1e-9, angles) for ns, angles in passed])
+        angular = angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
+        tracked = metric_messages.track_message(track, edge, angular, header, skew_s)
+        measurement.settle()
+        return [
+            gaze_messages.edge_judgement(edges),
+            gaze_messages.fovea_disparity(error, models[0].fx_px),
+            gaze_messages.track_sighting(tracked, models[0]),
+        ]
+
+
+class Lockstep:
+    """World, metric and controller on one clock. `advance_to` lets all of them run; `on_step` sees every command."""
+
+    def __init__(self, world: PhotoWorld, rig: Rig, parameters: GazeParameters | None = None) -> None:
+        self.world = world
+        self.controller = GazeController(rig, parameters or GazeParameters(), CONTROL_PERIOD_S)
+        self.metric = MetricOfPairs(rig, world.lenses)
+        self.on_step: Callable[[Any], None] = lambda command: None
+        self.newest_exposure_s = -math.inf
+        """When the left image of the newest pair that was measured was exposed."""
+        self.newest_published_s = math.nan
+        """When the newest left image that was published was exposed."""
+        self._schedule = Schedule(world.parameters, world.time_s)
+        self._frames: dict[str, list[tuple[float, Image]]] = {eye: [] for eye in EYES}
+        self._arrivals: list[tuple[float, int, list[Observation], float]] = []
+        self._order = itertools.count()
+        self._next_step_s = world.time_s + 0.5 * CONTROL_PERIOD_S
+
+    def advance_to(self, until_s: float) -> None:
+        """Let everything happen that is due until then."""
+        while min(self._schedule.next_due_s(), self._next_step_s) <= until_s:
+            if self._schedule.next_due_s() <= self._next_step_s:
+                self._world_event()
+            else:
+                self._control()
+                self._next_step_s += CONTROL_PERIOD_S
+        self.world.advance_to(until_s)
+
+    def click(self, pixel: tuple[float, float]) -> int:
+        """Ask the controller to look at a pixel (x, y) of the newest left image that was published."""
+        x, y = self.metric.left_camera.undistort([pixel])[0]
+        goal = Goal(
+            GoalKind.PIXEL,
+            left_eye=True,
+            left_xy=(float(x), float(y)),
+            stamp_s=_clock_s(self.newest_published_s),
+        )
+        return self.controller.look_at(goal, _clock_s(self.world.time_s))
+
+    def _world_event(self) -> None:
+        due_s = self._schedule.next_due_s()
+        event = self._schedule.pop(due_s)
+        world = self.world
+        if event.kind == "publish":
+            self._publish(event.eye, *event.payload)  # type: ignore[misc]
+            return
+        world.advance_to(event.due_s)
+        if event.kind == "joints":
+            report = world.joint_states()
+            self.metric.on_joints(_clock_s(event.due_s), report)
+            self._arrive(event.due_s + JOINT_REPORT_S, [JointReport(_clock_s(event.due_s), dict(report))])
+            return
+        publish_s = event.due_s + world.parameters.camera.latency_s
+        self._schedule.publish(event.eye, publish_s, (event.due_s, world.expose(event.eye)))
+
+    def _publish(self, eye: str, exposed_s: float, develop: Callable[[], Image]) -> None:
+        self._frames[eye].append((exposed_s, develop()))
+        if eye == "left":
+            self.newest_published_s = exposed_s
+        if not all(self._frames.values()):
+            return
+        (left_s, left), (right_s, right) = (self._frames[e].pop(0) for e in EYES)
+        seen = self.metric.observe(left, right, _clock_s(left_s), _clock_s(right_s))
+        published_s = max(left_s, right_s) + self.world.parameters.camera.latency_s
+        self._arrive(published_s + PROCESSING_S, seen, left_s)
+
+    def _arrive(self, due_s: float, seen: list[Observation], exposed_s: float = -math.inf) -> None:
+        heapq.heappush(self._arrivals, (due_s, next(self._order), seen, exposed_s))
+
+    def _control(self) -> None:
+        now_s, arrived = self._next_step_s, []
+        self.world.advance_to(now_s)
+        while self._arrivals and self._arrivals[0][0] <= now_s:
+            _, _, seen, exposed_s = heapq.heappop(self._arrivals)
+            arrived += seen
+            self.newest_exposure_s = max(self.newest_exposure_s, exposed_s)
+        command = self.controller.step(_clock_s(now_s), arrived)
+        if command.joints_rad is not None:
+            self.world.command(dict(zip(JOINT_NAMES, command.joints_rad.tolist(), strict=True)), now_s)
+        self.on_step(command)
+
+
+def record(lockstep: Lockstep, point: PhotoPoint, duration_s: float, rest_s: float) -> Trace:
+    """Click on a point as the left eye sees it now and follow what happens; the trace ends after `duration_s`.
+
+    It ends before that once `verged` has stood for `rest_s`.
+    """
+    world, trace = lockstep.world, Trace()
+    began_s = world.time_s
+    trace.start_errors_rad = world.errors_to(point)
+    verged_since_s = math.inf
+
+    def note(command: Any) -> None:
+        nonlocal verged_since_s
+        now_s, report = world.time_s - began_s, command.report
+        vergence, version, tilt = (math.degrees(error) for error in world.errors_to(point))
+        if math.isinf(trace.first_result_s) and lockstep.newest_exposure_s >= began_s:
+            trace.first_result_s = now_s
+        trace.time_s.append(now_s)
+        trace.aside_deg.append(max(abs(version), abs(tilt)))
+        trace.vergence_deg.append(vergence)
+        trace.verged.append(bool(report.verged))
+        trace.phase.append(report.phase.name.lower())
+        trace.reason.append(report.reason)
+        verged_since_s = min(verged_since_s, now_s) if report.verged else math.inf
+
+    lockstep.click(world.project("left", point))
+    lockstep.on_step = note
+    while world.time_s < began_s + duration_s - 1e-9 and world.time_s - began_s - verged_since_s < rest_s:
+        lockstep.advance_to(world.time_s + CONTROL_PERIOD_S)
+    trace.outside_share = max(world.outside_share(eye) for eye in EYES)
+    return trace
+
+
+def _model(lens: Lens) -> CameraModel:
+    camera = lens.camera
+    matrix = [camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0]
+    return CameraModel.from_camera_info_values(camera.width_px, camera.height_px, matrix, lens.distortion)
+
+
+def _clock_s(world_s: float) -> float:
+    return _CLOCK_START_S + world_s
+
+
+def _ns(stamp_s: float) -> int:
+    return round(stamp_s * 1e9)
