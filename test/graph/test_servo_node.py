@@ -303,7 +303,7 @@ def test_time_outs_change_while_running(make_graph: Callable[..., Graph]):
         ({"backend": "kernel_pwm", "servos": ""}, ParameterError, "servos"),
         ({"joints": ["neck"], "park_rad": [0.0]}, ValueError, "'neck' has no servo"),
         ({"joints": ["tilt"]}, ParameterError, "park_rad"),
-        ({"speed": 1.0}, ParameterError, "no such name"),
+        ({"speed": 1.0}, ParameterError, "there is no parameter 'speed'"),
         ({"kernel_pwm.chip": 7}, DriverUnavailableError, "allowed is one of 0"),
     ],
 )

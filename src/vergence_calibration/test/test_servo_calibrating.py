@@ -26,7 +26,7 @@ from vergence_calibration.servos.visual import VisualParameters, calibrate_head
 from vergence_rig.camera import CameraModel
 from vergence_rig.rig import CameraSpec
 from vergence_rig.servo import MG995, SG90, ServoPlant, ServoSpec
-from vergence_servo.calibration import CalibrationError, ServoCalibration, default_servos, load_servos
+from vergence_servo.calibration import ServoCalibration, ServoCalibrationError, default_servos, load_servos
 
 DEG = math.pi / 180
 CAMERA = CameraModel(CameraSpec())
@@ -92,13 +92,13 @@ def test_a_servo_mounted_the_other_way_gets_the_other_sign():
     ],
 )
 def test_nonsense_is_rejected(jog, text: str):
-    with pytest.raises(CalibrationError, match=text):
+    with pytest.raises(ServoCalibrationError, match=text):
         jog().result()
 
 
 @pytest.mark.parametrize("typed", ["", "left", "nan", "181", "-inf"])
 def test_angles_that_are_none_are_rejected(typed: str):
-    with pytest.raises(CalibrationError):
+    with pytest.raises(ServoCalibrationError):
         session().mark_angle(typed)
 
 
@@ -261,13 +261,13 @@ def test_an_offset_moves_the_centre_the_right_way():
     ],
 )
 def test_moves_that_tell_nothing_are_refused(pulses: list[float], angles: list[float], text: str):
-    with pytest.raises(CalibrationError, match=text):
+    with pytest.raises(ServoCalibrationError, match=text):
         axis_response(pulses, angles)
 
 
 def test_a_servo_that_does_not_move_is_refused():
     pulses = [ServoCalibration(channel=0).pulse_us(angle) for angle in staircase(0.1, 10, 2)]
-    with pytest.raises(CalibrationError, match=r"0\.02 to 0\.35"):
+    with pytest.raises(ServoCalibrationError, match=r"0\.02 to 0\.35"):
         axis_response(pulses, [0.0] * len(pulses))
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from vergence_camera.camera_info import (
     Calibration,
-    CalibrationError,
+    CameraCalibrationError,
     calibration_path,
     load_calibration,
     save_calibration,
@@ -93,7 +93,7 @@ def test_wrong_entries_are_named(tmp_path: Path, entry: str, value: object, text
     document[entry] = value
     path = tmp_path / "wrong.yaml"
     path.write_text(yaml.safe_dump(document))
-    with pytest.raises(CalibrationError) as caught:
+    with pytest.raises(CameraCalibrationError) as caught:
         load_calibration(path)
     assert str(path) in str(caught.value)
     assert text in str(caught.value)
@@ -103,12 +103,12 @@ def test_wrong_entries_are_named(tmp_path: Path, entry: str, value: object, text
 def test_files_that_are_no_calibration(tmp_path: Path, content: str) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text(content)
-    with pytest.raises(CalibrationError, match=r"wrong\.yaml"):
+    with pytest.raises(CameraCalibrationError, match=r"wrong\.yaml"):
         load_calibration(path)
 
 
 def test_a_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(CalibrationError, match="cannot be read"):
+    with pytest.raises(CameraCalibrationError, match="cannot be read"):
         load_calibration(tmp_path / "none.yaml")
 
 
@@ -137,7 +137,7 @@ def test_urls(monkeypatch: pytest.MonkeyPatch, url: str, path: str) -> None:
     "url", ["left.yaml", "http://x/y.yaml", "package://other/x.yaml", "file://host/x", "package://"]
 )
 def test_other_urls_are_refused(url: str) -> None:
-    with pytest.raises(CalibrationError, match="camera_info_url"):
+    with pytest.raises(CameraCalibrationError, match="camera_info_url"):
         calibration_path(url, "left", share)
 
 

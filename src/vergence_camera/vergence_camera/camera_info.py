@@ -16,7 +16,7 @@ DISTORTION_LENGTHS = {"plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14), "
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-class CalibrationError(ValueError):
+class CameraCalibrationError(ValueError):
     """A calibration that cannot be: names the file, the entry, its value and what is allowed."""
 
 
@@ -38,18 +38,20 @@ class Calibration:
         for entry, length in (("camera_matrix", 9), ("rectification_matrix", 9), ("projection_matrix", 12)):
             values = {"camera_matrix": self.k, "rectification_matrix": self.r, "projection_matrix": self.p}[entry]
             if len(values) != length or not all(math.isfinite(value) for value in values):
-                raise CalibrationError(f"{entry} is {list(values)}: allowed are {length} finite numbers")
+                raise CameraCalibrationError(f"{entry} is {list(values)}: allowed are {length} finite numbers")
         if self.width_px < 1 or self.height_px < 1:
-            raise CalibrationError(f"image size is {self.width_px}x{self.height_px}: allowed is at least 1x1")
+            raise CameraCalibrationError(f"image size is {self.width_px}x{self.height_px}: allowed is at least 1x1")
         if not (self.k[0] > 0.0 and self.k[4] > 0.0):
-            raise CalibrationError(f"focal lengths are {self.k[0]:g}, {self.k[4]:g}: allowed is above 0")
+            raise CameraCalibrationError(f"focal lengths are {self.k[0]:g}, {self.k[4]:g}: allowed is above 0")
         lengths = DISTORTION_LENGTHS.get(self.distortion_model)
         if lengths is None:
             known = ", ".join(DISTORTION_LENGTHS)
-            raise CalibrationError(f"distortion_model is {self.distortion_model!r}: allowed is one of {known}")
+            raise CameraCalibrationError(f"distortion_model is {self.distortion_model!r}: allowed is one of {known}")
         if len(self.d) not in lengths or not all(math.isfinite(value) for value in self.d):
             allowed = " or ".join(map(str, lengths))
-            raise CalibrationError(f"distortion_coefficients is {list(self.d)}: allowed are {allowed} finite numbers")
+            raise CameraCalibrationError(
+                f"distortion_coefficients is {list(self.d)}: allowed are {allowed} finite numbers"
+            )
 
     def _monocular_projection(self) -> tuple[float, ...]:
         k = self.k
@@ -57,15 +59,15 @@ class Calibration:
 
 
 def load_calibration(path: Path) -> Calibration:
-    """Return the calibration in a YAML file; raise CalibrationError if it is not one."""
+    """Return the calibration in a YAML file; raise CameraCalibrationError if it is not one."""
     try:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise CalibrationError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
+        raise CameraCalibrationError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
     try:
         return _from_document(document)
-    except CalibrationError as error:
-        raise CalibrationError(f"{path}: {error}") from None
+    except CameraCalibrationError as error:
+        raise CameraCalibrationError(f"{path}: {error}") from None
 
 
 def save_calibration(calibration: Calibration, path: Path) -> None:
@@ -98,7 +100,7 @@ def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -
         package_share: gives the share directory of a package; raises LookupError for an unknown one.
 
     Raises:
-        CalibrationError: another kind of URL, or an unknown package.
+        CameraCalibrationError: another kind of URL, or an unknown package.
     """
     ros_home = os.environ.get("ROS_HOME") or str(Path.home() / ".ros")
     filled = (url or "file://${ROS_HOME}/camera_info/${NAME}.yaml").replace("${ROS_HOME}", ros_home)
@@ -110,8 +112,8 @@ def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -
         try:
             return Path(package_share(parts.netloc)) / unquote(parts.path).lstrip("/")
         except LookupError as error:
-            raise CalibrationError(f"camera_info_url is '{url}': there is no package '{parts.netloc}'") from error
-    raise CalibrationError(f"camera_info_url is '{url}': allowed is file:///PATH or package://PACKAGE/PATH")
+            raise CameraCalibrationError(f"camera_info_url is '{url}': there is no package '{parts.netloc}'") from error
+    raise CameraCalibrationError(f"camera_info_url is '{url}': allowed is file:///PATH or package://PACKAGE/PATH")
 
 
 def _matrix(rows: int, columns: int, data: Sequence[float]) -> dict[str, Any]:
@@ -120,7 +122,7 @@ def _matrix(rows: int, columns: int, data: Sequence[float]) -> dict[str, Any]:
 
 def _from_document(document: Any) -> Calibration:
     if not isinstance(document, dict):
-        raise CalibrationError("is no mapping of image_width, camera_matrix, ...")
+        raise CameraCalibrationError("is no mapping of image_width, camera_matrix, ...")
     k = _numbers(document, "camera_matrix")
     return Calibration(
         width_px=_whole(document, "image_width"),
@@ -137,7 +139,7 @@ def _from_document(document: Any) -> Calibration:
 def _whole(document: dict[str, Any], entry: str) -> int:
     value = document.get(entry)
     if not isinstance(value, int) or isinstance(value, bool):
-        raise CalibrationError(f"{entry} is {value!r}: allowed is a whole number")
+        raise CameraCalibrationError(f"{entry} is {value!r}: allowed is a whole number")
     return value
 
 
@@ -145,5 +147,5 @@ def _numbers(document: dict[str, Any], entry: str) -> tuple[float, ...]:
     value = document.get(entry)
     data = value.get("data") if isinstance(value, dict) else None
     if not isinstance(data, list) or not all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in data):
-        raise CalibrationError(f"{entry} is {value!r}: allowed is a mapping with a list of numbers under 'data'")
+        raise CameraCalibrationError(f"{entry} is {value!r}: allowed is a mapping with a list of numbers under 'data'")
     return tuple(float(x) for x in data)

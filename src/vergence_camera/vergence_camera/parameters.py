@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from vergence_camera.capture_loop import Patience
 from vergence_camera.errors import ChoiceError
 from vergence_camera.frame import ModeRequest
-from vergence_camera.source_choice import SourceOptions, kind_of
+from vergence_camera.source_choice import ALLOWED_DEVICES, SourceOptions, kind_of
 from vergence_camera.v4l2.capture import READABLE_FORMATS
 from vergence_rig.parameters import REQUIRED, Groups, ParameterError, Parameters, parameter
 
@@ -74,12 +74,12 @@ class CameraParameters(Parameters):
         """See Parameters."""
         try:
             kind_of(self.device)
-        except ChoiceError as error:
-            raise ParameterError("device", self.device, str(error)) from None
+        except ChoiceError:
+            raise ParameterError("device", self.device, ALLOWED_DEVICES) from None
         if self.last_retry_s < self.first_retry_s:
             raise ParameterError("last_retry_s", self.last_retry_s, f"at least first_retry_s ({self.first_retry_s:g})")
         if self.lock == "follow" and not self.partner:
-            raise ParameterError("lock", self.lock, "'follow' only if partner names the other camera node")
+            raise ParameterError("lock", self.lock, "'off' or 'hold' while partner names no other camera node")
 
     def source_options(self) -> SourceOptions:
         """Return what the source has to know."""

@@ -17,6 +17,11 @@ from vergence_camera.v4l2.capture import DeviceUser, V4l2Source
 from vergence_camera.v4l2.kernel import Kernel, LinuxKernel
 
 _VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".webm", ".ts", ".mpg", ".h264", ".264", ".m3u8", ".mjpg")
+_STREAM_SCHEMES = ("rtsp", "rtsps", "rtmp", "udp", "tcp", "srt")
+ALLOWED_DEVICES = "a camera, a video file, a folder of pictures or a URL (file, http, https, {} or {})".format(
+    ", ".join(_STREAM_SCHEMES[:-1]), _STREAM_SCHEMES[-1]
+)
+"""What a camera's choice must be, for messages."""
 
 
 class Kind(Enum):
@@ -31,7 +36,7 @@ class Kind(Enum):
 def kind_of(text: str) -> Kind:
     """Return what `text` names, without looking whether it is there; raise ChoiceError if it can be nothing."""
     if not text.strip():
-        raise ChoiceError("device is empty: give a camera, a video file, a folder of pictures or a URL")
+        raise ChoiceError(f"device must be {ALLOWED_DEVICES}: got an empty text")
     scheme, separator, _ = text.partition("://")
     if separator:
         return _kind_of_url(text, scheme.lower())
@@ -49,11 +54,9 @@ def _kind_of_url(text: str, scheme: str) -> Kind:
     if scheme in ("http", "https"):
         is_video = urlsplit(text).path.lower().endswith(_VIDEO_SUFFIXES) and not text.lower().endswith(".mjpg")
         return Kind.DECODED_STREAM if is_video else Kind.HTTP_JPEG
-    if scheme in ("rtsp", "rtsps", "rtmp", "udp", "tcp", "srt"):
+    if scheme in _STREAM_SCHEMES:
         return Kind.DECODED_STREAM
-    raise ChoiceError(
-        f"device is '{text}': a URL begins with file, http, https, rtsp, rtsps, rtmp, srt, tcp or udp, not '{scheme}'"
-    )
+    raise ChoiceError(f"device must be {ALLOWED_DEVICES}: got '{text}', whose scheme is '{scheme}'")
 
 
 @dataclass(frozen=True)

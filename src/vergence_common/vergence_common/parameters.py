@@ -128,7 +128,7 @@ def _named(prefix: str, build: Callable[[], Any]) -> Any:
     try:
         return build()
     except ParameterError as error:
-        raise ParameterError(prefix + error.name, error.value, error.allowed) from None
+        raise error.prefixed(prefix) from None
 
 
 def _ros_type(spec: ParameterSpec) -> Parameter.Type:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_rig.camera import CameraError, CameraModel
+from vergence_rig.camera import CameraModel, CameraModelError
 from vergence_rig.rig import CameraSpec
 
 PLAIN = CameraModel(CameraSpec())
@@ -69,12 +69,12 @@ def test_contains_is_the_image_to_its_outer_edges() -> None:
     ],
 )
 def test_descriptions_that_cannot_be(k: list[float], d: list[float], model: str, named: str) -> None:
-    with pytest.raises(CameraError, match=named):
+    with pytest.raises(CameraModelError, match=named):
         CameraModel.from_camera_info_values(640, 480, k, d, model)
 
 
 def test_image_without_size() -> None:
-    with pytest.raises(CameraError, match="size"):
+    with pytest.raises(CameraModelError, match="size"):
         CameraModel.from_camera_info_values(0, 480, K, [])
 
 

@@ -72,7 +72,7 @@ def test_what_is_not_allowed_is_named(name, value):
     text = str(raised.value)
     assert f"'{name}'" in text
     assert repr(value) in text
-    assert "allowed is" in text
+    assert "must be" in text
 
 
 def test_cross_checks_run_at_every_change():

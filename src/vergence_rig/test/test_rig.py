@@ -44,7 +44,7 @@ def test_default_rig_is_the_papers_second_design() -> None:
         ({"baseline_m": "wide"}, ["baseline_m", "wide", "number"]),
         ({"baseline_m": True}, ["baseline_m", "True", "number"]),
         ({"baseline_m": float("nan")}, ["baseline_m", "nan"]),
-        ({"left_camera": {"fx_px": 0}}, ["left_camera.fx_px", "is 0", "from 1", "px"]),
+        ({"left_camera": {"fx_px": 0}}, ["left_camera.fx_px", "got 0", "from 1", "px"]),
         ({"left_camera": {"width_px": 640.5}}, ["left_camera.width_px", "640.5", "whole"]),
         ({"right_camera": {"distortion": [0.1, 0.2]}}, ["right_camera.distortion", "five"]),
         ({"right_camera": {"focal": 3}}, ["right_camera", "focal", "fx_px"]),

@@ -21,7 +21,7 @@ _ITERATIONS = 50
 _TOLERANCE = 1e-10
 
 
-class CameraError(ValueError):
+class CameraModelError(ValueError):
     """A camera description that cannot be: names the part, its value and what is allowed."""
 
 
@@ -44,12 +44,12 @@ class CameraModel:
     ) -> "CameraModel":
         """Build the model from the values of a sensor_msgs/CameraInfo.
 
-        `k` is the row-major 3x3 intrinsic matrix, `d` the distortion coefficients. Raises CameraError for an
+        `k` is the row-major 3x3 intrinsic matrix, `d` the distortion coefficients. Raises CameraModelError for an
         uncalibrated camera (zero focal length) or an unknown distortion model.
         """
         matrix = np.asarray(k, dtype=np.float64).reshape(-1)
         if matrix.shape != (9,):
-            raise CameraError(f"k has {matrix.size} values: allowed is 9, the row-major 3x3 intrinsic matrix")
+            raise CameraModelError(f"k has {matrix.size} values: allowed is 9, the row-major 3x3 intrinsic matrix")
         model = cls.__new__(cls)
         model._set(width, height, (matrix[0], matrix[4], matrix[2], matrix[5]), d, distortion_model)
         return model
@@ -60,18 +60,18 @@ class CameraModel:
         self.width_px, self.height_px = int(width), int(height)
         self.fx_px, self.fy_px, self.cx_px, self.cy_px = (float(value) for value in intrinsics)
         if self.width_px <= 0 or self.height_px <= 0:
-            raise CameraError(f"image size is {width} x {height}: allowed is at least 1 x 1 [px]")
+            raise CameraModelError(f"image size is {width} x {height}: allowed is at least 1 x 1 [px]")
         if not (np.isfinite(intrinsics).all() and self.fx_px > 0 and self.fy_px > 0):
-            raise CameraError(
+            raise CameraModelError(
                 f"fx, fy, cx, cy are {tuple(intrinsics)}: allowed are finite values, fx and fy above 0 [px]"
             )
         if distortion_model not in _COEFFICIENTS:
             known = ", ".join(repr(name) for name in _COEFFICIENTS if name)
-            raise CameraError(f"distortion_model is {distortion_model!r}: allowed is one of {known}")
+            raise CameraModelError(f"distortion_model is {distortion_model!r}: allowed is one of {known}")
         coefficients = np.asarray(d, dtype=np.float64).reshape(-1)
         if coefficients.size not in _COEFFICIENTS[distortion_model] or not np.isfinite(coefficients).all():
             counts = " or ".join(str(count) for count in _COEFFICIENTS[distortion_model])
-            raise CameraError(
+            raise CameraModelError(
                 f"distortion is {coefficients.tolist()}: allowed are {counts} finite values for '{distortion_model}'"
             )
         self.distortion_model = distortion_model or "plumb_bob"

@@ -9,7 +9,7 @@ parameter descriptors) and the shipped YAML (a test holds it equal to the defaul
         device: str = parameter(REQUIRED, "which camera", read_only=True)
 
         def check(self) -> None:
-            if ...: raise ParameterError("blur_sigma_px", self.blur_sigma_px, "less than half of ...")
+            if ...: raise ParameterError("blur_sigma_px", self.blur_sigma_px, "less than ...")
 """
 
 import dataclasses
@@ -32,11 +32,18 @@ REQUIRED: Any = _Required()
 
 
 class ParameterError(ValueError):
-    """A parameter that cannot be: names it, the value and what is allowed."""
+    """An invalid parameter value: the message names the parameter, what it must be, and the value given.
+
+    `allowed` completes the sentence "parameter 'X' must be ...".
+    """
 
     def __init__(self, name: str, value: object, allowed: str) -> None:
-        super().__init__(f"parameter '{name}' is {value!r}: allowed is {allowed}")
+        super().__init__(f"parameter '{name}' must be {allowed}: got {value!r}")
         self.name, self.value, self.allowed = name, value, allowed
+
+    def prefixed(self, prefix: str) -> "ParameterError":
+        """Return the same error with `prefix` before the parameter's name: the group or the file's key it stands in."""
+        return ParameterError(prefix + self.name, self.value, self.allowed)
 
 
 class RenamedParameterError(ParameterError):
@@ -52,7 +59,14 @@ class UnknownParameterError(ParameterError):
     """A parameter that is not declared."""
 
     def __init__(self, name: str, value: object, known: Iterable[str]) -> None:
-        super().__init__(name, value, "no such name, only " + ", ".join(sorted(known)))
+        self._known = tuple(sorted(known))
+        names = ", ".join(self._known)
+        ValueError.__init__(self, f"there is no parameter '{name}': its name must be one of {names}")
+        self.name, self.value, self.allowed = name, value, f"named one of {names}"
+
+    def prefixed(self, prefix: str) -> ParameterError:
+        """See ParameterError."""
+        return UnknownParameterError(prefix + self.name, self.value, [prefix + name for name in self._known])
 
 
 @dataclass(frozen=True)
@@ -161,7 +175,7 @@ class Parameters:
         for spec in self.specs():
             value = getattr(self, spec.name)
             if value is REQUIRED:
-                raise ParameterError(spec.name, None, f"{spec.allowed}, and it must be given")
+                raise ParameterError(spec.name, None, f"given ({spec.allowed})")
             object.__setattr__(self, spec.name, spec.normalised(value))
         self.check()
 

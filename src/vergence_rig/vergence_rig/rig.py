@@ -57,7 +57,7 @@ class JointSpec:
         _check_number("upper_rad", self.upper_rad, -half_turn, half_turn, "rad")
         _check_number("max_speed_rad_s", self.max_speed_rad_s, 1e-3, 1e3, "rad/s")
         if self.lower_rad >= self.upper_rad:
-            raise RigError(f"upper_rad is {self.upper_rad!r}: allowed is more than lower_rad, {self.lower_rad!r} [rad]")
+            raise RigError(f"upper_rad must be more than lower_rad, {self.lower_rad!r} [rad]: got {self.upper_rad!r}")
 
     def clamp(self, angle_rad: float) -> float:
         """Return the angle [rad] held within the joint's limits."""
@@ -112,8 +112,8 @@ class Rig:
         widest_rad = self.pan_right.upper_rad - self.pan_left.lower_rad
         if self.minimum_vergence_rad >= widest_rad:
             raise RigError(
-                f"minimum_vergence_rad is {self.minimum_vergence_rad!r}: "
-                f"allowed is less than the pan joints can reach, {widest_rad:g} [rad]"
+                f"minimum_vergence_rad must be less than the pan joints can reach, {widest_rad:g} [rad]: "
+                f"got {self.minimum_vergence_rad!r}"
             )
 
     @property
@@ -230,7 +230,7 @@ def _servo(value: Any) -> ServoSpec:
     if isinstance(value, str):
         if value not in PRESETS:
             known = ", ".join(repr(name) for name in PRESETS)
-            raise RigError(f"servo is {value!r}: allowed is one of {known}, or a mapping of its figures")
+            raise RigError(f"servo must be one of {known}, or a mapping of its parameters: got {value!r}")
         return PRESETS[value]
     return _parameters("servo", ServoSpec(), value)
 
@@ -243,25 +243,25 @@ def _parameters(key: str, default: Spec, value: Any) -> Spec:
     try:
         return default.replaced(**entries)
     except ParameterError as error:
-        raise RigError(f"{key}.{error.name} is {error.value!r}: allowed is {error.allowed}") from error
+        raise RigError(f"{key}.{error.name} must be {error.allowed}: got {error.value!r}") from error
 
 
 def _mapping(key: str, value: Any, allowed: tuple[str, ...]) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        raise RigError(f"{key} is {value!r}: allowed is a mapping with any of {', '.join(allowed)}")
+        raise RigError(f"{key} must be a mapping with any of {', '.join(allowed)}: got {value!r}")
     for name in value:
         if name not in allowed:
-            raise RigError(f"{key} has the key {name!r}: allowed are {', '.join(allowed)}")
+            raise RigError(f"{key} must have no keys but {', '.join(allowed)}: got {name!r}")
     return value
 
 
 def _number(entries: Mapping[str, Any], key: str, default: float) -> float:
     value = entries.get(key, default)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise RigError(f"{key} is {value!r}: allowed is a number")
+        raise RigError(f"{key} must be a number: got {value!r}")
     return float(value)
 
 
 def _check_number(key: str, value: float, minimum: float, maximum: float, unit: str) -> None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not minimum <= value <= maximum:
-        raise RigError(f"{key} is {value!r}: allowed is a number from {minimum:g} to {maximum:g} [{unit}]")
+        raise RigError(f"{key} must be a number from {minimum:g} to {maximum:g} [{unit}]: got {value!r}")

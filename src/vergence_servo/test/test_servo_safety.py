@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from vergence_servo.calibration import CalibrationError, ServoCalibration, ServoLimits, servo_limits
+from vergence_servo.calibration import ServoCalibration, ServoCalibrationError, ServoLimits, servo_limits
 from vergence_servo.safety import safe_pulse_us
 
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
@@ -31,7 +31,7 @@ def limited_servos(draw: st.DrawFn) -> ServoLimits:
     )
     try:
         limits = servo_limits("any", servo)
-    except CalibrationError:
+    except ServoCalibrationError:
         assume(False)
         raise
     assume(limits.maximum_us - limits.minimum_us > 20.0)

@@ -21,7 +21,7 @@ _DEG = math.pi / 180.0
 _PLAUSIBLE_US_PER_RAD = (150.0, 4000.0)
 
 
-class CalibrationError(ValueError):
+class ServoCalibrationError(ValueError):
     """A servos.yaml that cannot be: names file, servo, key, value and what is allowed."""
 
 
@@ -52,14 +52,16 @@ class ServoCalibration(Parameters):
     def check(self) -> None:
         """Refuse what no servo can be."""
         if len(self.angles_rad) < 2 or any(b - a < 0.01 for a, b in zip(self.angles_rad, self.angles_rad[1:])):  # noqa: B905
-            raise ParameterError("angles_rad", self.angles_rad, "two or more, each at least 0.01 above the last [rad]")
+            raise ParameterError(
+                "angles_rad", self.angles_rad, "a list of two or more, each 0.01 or more above the last [rad]"
+            )
         if len(self.pulses_us) != len(self.angles_rad):
-            raise ParameterError("pulses_us", self.pulses_us, f"as many as angles_rad, {len(self.angles_rad)}")
+            raise ParameterError("pulses_us", self.pulses_us, f"as many as angles_rad ({len(self.angles_rad)})")
         low, high = _PLAUSIBLE_US_PER_RAD
         for i in range(len(self.pulses_us) - 1):
             slope = (self.pulses_us[i + 1] - self.pulses_us[i]) / (self.angles_rad[i + 1] - self.angles_rad[i])
             if not low <= slope <= high:
-                allowed = f"rising by {low:g} to {high:g} us per rad of angles_rad (turn it round with sign: -1)"
+                allowed = f"rising by {low:g} to {high:g} us per rad of angles_rad (sign: -1 reverses a servo)"
                 raise ParameterError("pulses_us", self.pulses_us, allowed)
         if self.sign not in (1, -1):
             raise ParameterError("sign", self.sign, "1 or -1")
@@ -123,24 +125,23 @@ DEFAULT: dict[str, dict[str, Any]] = {
 
 
 def servos_from_mapping(document: Any) -> dict[str, ServoCalibration]:
-    """Build the calibrations by joint name. Raises CalibrationError."""
+    """Build the calibrations by joint name. Raises ServoCalibrationError."""
     if not isinstance(document, Mapping) or set(document) != {"servos"} or not isinstance(document["servos"], Mapping):
-        raise CalibrationError(f"found {_short(document)}: allowed is 'servos:' with one mapping per joint")
+        raise ServoCalibrationError(f"the file must be 'servos:' with one mapping per joint: got {_short(document)}")
     servos: dict[str, ServoCalibration] = {}
     for joint, entries in document["servos"].items():
         if not isinstance(joint, str) or not isinstance(entries, Mapping):
-            raise CalibrationError(f"servos.{joint} is {_short(entries)}: allowed is a mapping of a servo's figures")
+            raise ServoCalibrationError(f"servos.{joint} must be a mapping of parameters: got {_short(entries)}")
         try:
             preset = PRESETS.get(str(entries.get("model", "")), {})
             servos[joint] = ServoCalibration.from_mapping({**preset, **entries})
         except ParameterError as error:
-            text = f"servos.{joint}.{error.name} is {error.value!r}: allowed is {error.allowed}"
-            raise CalibrationError(text) from error
+            raise ServoCalibrationError(str(error.prefixed(f"servos.{joint}."))) from error
     if not servos:
-        raise CalibrationError("servos is empty: allowed is one mapping per joint")
+        raise ServoCalibrationError("servos must have one mapping per joint: got none")
     channels = [servo.channel for servo in servos.values()]
     if len(set(channels)) != len(channels):
-        raise CalibrationError(f"channels are {channels}: allowed is a different one for every joint")
+        raise ServoCalibrationError(f"each joint must have a different channel: got {channels}")
     return servos
 
 
@@ -150,17 +151,17 @@ def default_servos() -> dict[str, ServoCalibration]:
 
 
 def load_servos(path: str | Path) -> dict[str, ServoCalibration]:
-    """Read servos.yaml; "" gives the built-in ones. Raises CalibrationError."""
+    """Read servos.yaml; "" gives the built-in ones. Raises ServoCalibrationError."""
     if str(path) == "":
         return default_servos()
     try:
         return servos_from_mapping(yaml.safe_load(Path(path).read_text(encoding="utf-8")))
     except OSError as error:
-        raise CalibrationError(f"servo file '{path}' cannot be read: {error.strerror or error}") from error
+        raise ServoCalibrationError(f"servo file '{path}' cannot be read: {error.strerror or error}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise CalibrationError(f"servo file '{path}' is not YAML: {' '.join(str(error).split())}") from error
-    except CalibrationError as error:
-        raise CalibrationError(f"servo file '{path}': {error}") from error
+        raise ServoCalibrationError(f"servo file '{path}' is not YAML: {' '.join(str(error).split())}") from error
+    except ServoCalibrationError as error:
+        raise ServoCalibrationError(f"servo file '{path}': {error}") from error
 
 
 def _short(value: object) -> str:
@@ -191,7 +192,7 @@ class ServoLimits:
 def servo_limits(name: str, calibration: ServoCalibration, joint: JointSpec | None = None) -> ServoLimits:
     """Return the limits that the servo's pulses, its soft limits and the rig's joint all allow.
 
-    Raises CalibrationError where nothing is left.
+    Raises ServoCalibrationError where nothing is left.
     """
     lower, upper, speed = calibration.lower_rad, calibration.upper_rad, calibration.speed_rad_s
     if joint is not None:
@@ -200,7 +201,7 @@ def servo_limits(name: str, calibration: ServoCalibration, joint: JointSpec | No
     ends = sorted((calibration.pulse_us(lower), calibration.pulse_us(upper)))
     low_us, high_us = max(ends[0], calibration.minimum_us), min(ends[1], calibration.maximum_us)
     if lower >= upper or low_us >= high_us:
-        raise CalibrationError(
+        raise ServoCalibrationError(
             f"servos.{name}: its pulses of {calibration.minimum_us:g} to {calibration.maximum_us:g} us, its soft "
             f"limits and the rig's joint limits ({lower:.3f} to {upper:.3f} rad) leave nothing to move in"
         )

@@ -20,7 +20,7 @@ from vergence_calibration.servos import servo_file
 from vergence_calibration.servos.jog_session import JogSession
 from vergence_calibration.servos.terminal import NoTerminalError, Terminal
 from vergence_rig.rig import load_rig
-from vergence_servo.calibration import CalibrationError, ServoCalibration, default_servos, load_servos
+from vergence_servo.calibration import ServoCalibration, ServoCalibrationError, default_servos, load_servos
 from vergence_servo.drivers.protocol import DriverIoError, ServoDriver
 from vergence_servo.drivers.registry import open_driver
 
@@ -61,7 +61,7 @@ def main(args: Sequence[str] | None = None) -> int:
 def _chosen(asked: list[str] | None, servos: Mapping[str, ServoCalibration]) -> list[str]:
     for name in asked or []:
         if name not in servos:
-            raise CalibrationError(f"joint is {name!r}: allowed is one of {', '.join(servos)}")
+            raise ServoCalibrationError(f"joint is {name!r}: allowed is one of {', '.join(servos)}")
     return list(asked or servos)
 
 
@@ -114,7 +114,7 @@ def _jog(terminal: Terminal, driver: ServoDriver, servo: ServoCalibration) -> Se
                     marks[key]()
                 else:
                     session.jog(key)
-            except (CalibrationError, DriverIoError) as error:
+            except (ServoCalibrationError, DriverIoError) as error:
                 message = str(error)
     finally:
         driver.release(servo.channel)
@@ -164,7 +164,7 @@ def _backend_values(settings: Sequence[str]) -> dict[str, Any]:
     for setting in settings:
         name, equals, text = setting.partition("=")
         if not equals:
-            raise CalibrationError(f"--set is {setting!r}: allowed is KEY=VALUE, a parameter of the backend")
+            raise ServoCalibrationError(f"--set is {setting!r}: allowed is KEY=VALUE, a parameter of the backend")
         values[name] = yaml.safe_load(text)
     return values
 

@@ -14,7 +14,7 @@ from sensor_msgs.msg import CameraInfo, JointState
 
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_common.stamps import to_nanoseconds
-from vergence_rig.camera import CameraError, CameraModel
+from vergence_rig.camera import CameraModel, CameraModelError
 
 EYES = ("left", "right")
 REPEAT_S = 0.02
@@ -84,7 +84,7 @@ class RunningHead:
                 models[eye] = CameraModel.from_camera_info_values(
                     info.width, info.height, list(info.k), list(info.d), info.distortion_model
                 )
-            except CameraError:
+            except CameraModelError:
                 continue  # not calibrated: the rig's figures do
         return models
 

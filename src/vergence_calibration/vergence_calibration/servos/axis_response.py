@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from vergence_calibration.lost_motion import LoopError, fit_loop
 from vergence_rig.parameters import ParameterError
-from vergence_servo.calibration import CalibrationError, ServoCalibration
+from vergence_servo.calibration import ServoCalibration, ServoCalibrationError
 
 _GAINS_RAD_PER_US = (math.radians(0.02), math.radians(0.35))
 
@@ -30,20 +30,20 @@ def axis_response(pulses_us: Sequence[float], angles_rad: Sequence[float]) -> Ax
         angles_rad: as many; only their differences count.
 
     Raises:
-        CalibrationError: too few samples, no motion seen, or a gain that no servo has.
+        ServoCalibrationError: too few samples, no motion seen, or a gain that no servo has.
     """
     try:
         loop = fit_loop(pulses_us, angles_rad)
     except LoopError as error:
-        raise CalibrationError(str(error)) from error
+        raise ServoCalibrationError(str(error)) from error
     low, high = _GAINS_RAD_PER_US
     if not low <= abs(loop.gain) <= high:
-        raise CalibrationError(
+        raise ServoCalibrationError(
             f"the eye turned by {math.degrees(loop.gain):+.4f} degrees per us: allowed is {math.degrees(low):.2f} to "
             f"{math.degrees(high):.2f} either way (is the right servo plugged in, and does the camera see enough?)"
         )
     if loop.residual > 0.25 * abs(loop.gain) * (max(pulses_us) - min(pulses_us)):
-        raise CalibrationError(
+        raise ServoCalibrationError(
             f"what was seen does not follow the pulses (off by {math.degrees(loop.residual):.2f} degrees)"
         )
     return AxisResponse(1 if loop.gain > 0 else -1, abs(loop.gain), loop.lost, loop.residual, loop.samples)
@@ -53,7 +53,7 @@ def calibrated(old: ServoCalibration, response: AxisResponse, offset_rad: float 
     """Return the calibration with the response's sign, gain, dead band and backlash.
 
     Joint angle 0 stays at its pulse, corrected by `offset_rad`: where the joint really was when it was told 0. Dead
-    band and backlash share the lost motion as they do in `old`. Raises CalibrationError.
+    band and backlash share the lost motion as they do in `old`. Raises ServoCalibrationError.
     """
     centre_us = old.pulse_us(0.0) - response.sign * offset_rad / response.gain_rad_per_us
     known = old.dead_band_rad + old.backlash_rad
@@ -63,7 +63,7 @@ def calibrated(old: ServoCalibration, response: AxisResponse, offset_rad: float 
     while centre_us - half_us < 300.0 or centre_us + half_us > 2700.0:
         reach_rad, half_us = 0.9 * reach_rad, 0.9 * half_us
         if reach_rad < math.radians(5.0):
-            raise CalibrationError(f"joint angle 0 would be at {centre_us:.0f} us: no servo reaches that")
+            raise ServoCalibrationError(f"joint angle 0 would be at {centre_us:.0f} us: no servo reaches that")
     try:
         return old.replaced(
             angles_rad=(-reach_rad, reach_rad),
@@ -74,4 +74,4 @@ def calibrated(old: ServoCalibration, response: AxisResponse, offset_rad: float 
             backlash_rad=min((1 - share) * response.lost_motion_rad, 0.2),
         )
     except ParameterError as error:
-        raise CalibrationError(str(error)) from error
+        raise ServoCalibrationError(str(error)) from error

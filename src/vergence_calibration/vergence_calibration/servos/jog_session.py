@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from vergence_rig.parameters import ParameterError
-from vergence_servo.calibration import CalibrationError, ServoCalibration
+from vergence_servo.calibration import ServoCalibration, ServoCalibrationError
 
 ABSOLUTE_US = (500.0, 2500.0)
 """No jogging beyond these, whatever the file says: servos may reach their stops earlier still."""
@@ -47,13 +47,13 @@ class JogSession:
         self.maximum_us = self.pulse_us
 
     def mark_angle(self, degrees: str) -> None:
-        """Record the joint angle here, as typed in degrees. Raises CalibrationError."""
+        """Record the joint angle here, as typed in degrees. Raises ServoCalibrationError."""
         try:
             angle_rad = math.radians(float(degrees.replace(",", ".")))
         except ValueError:
-            raise CalibrationError(f"angle is {degrees!r}: allowed is a number of degrees") from None
+            raise ServoCalibrationError(f"angle is {degrees!r}: allowed is a number of degrees") from None
         if not abs(angle_rad) <= math.pi / 2:
-            raise CalibrationError(f"angle is {degrees} degrees: allowed is -90 to 90")
+            raise ServoCalibrationError(f"angle is {degrees} degrees: allowed is -90 to 90")
         self.angles = [mark for mark in self.angles if abs(mark[0] - angle_rad) > 1e-6] + [(angle_rad, self.pulse_us)]
 
     @property
@@ -64,27 +64,29 @@ class JogSession:
         return absent + (["two angles"] if len(self.angles) < 2 else [])
 
     def result(self) -> ServoCalibration:
-        """Return the calibration that the marks make. Raises CalibrationError where they make none."""
+        """Return the calibration that the marks make. Raises ServoCalibrationError where they make none."""
         if self.missing:
-            raise CalibrationError(f"not recorded yet: {', '.join(self.missing)}")
+            raise ServoCalibrationError(f"not recorded yet: {', '.join(self.missing)}")
         assert self.minimum_us is not None
         assert self.centre_us is not None
         assert self.maximum_us is not None
         low_us, high_us = sorted((self.minimum_us, self.maximum_us))
         if high_us - low_us < _LEAST_RANGE_US:
-            raise CalibrationError(
+            raise ServoCalibrationError(
                 f"minimum and maximum are {high_us - low_us:g} us apart: allowed is {_LEAST_RANGE_US:g}"
             )
         if not low_us < self.centre_us < high_us:
-            raise CalibrationError(f"centre is {self.centre_us:g} us: allowed is between {low_us:g} and {high_us:g} us")
+            raise ServoCalibrationError(
+                f"centre is {self.centre_us:g} us: allowed is between {low_us:g} and {high_us:g} us"
+            )
         marks = self._marks_with_centre()
         joint_rad, pulses_us = zip(*sorted(marks, key=lambda mark: mark[1]), strict=True)
         if max(joint_rad) - min(joint_rad) < _LEAST_ANGLE_RAD:
-            raise CalibrationError("the angles lie within 10 degrees: record them further apart")
+            raise ServoCalibrationError("the angles lie within 10 degrees: record them further apart")
         sign = 1 if joint_rad[-1] > joint_rad[0] else -1
         shaft_rad = tuple(sign * angle for angle in joint_rad)
         if list(shaft_rad) != sorted(shaft_rad):
-            raise CalibrationError("the angles neither rise nor fall with the pulses: one of them is wrong")
+            raise ServoCalibrationError("the angles neither rise nor fall with the pulses: one of them is wrong")
         try:
             fresh = self.old.replaced(
                 angles_rad=shaft_rad,
@@ -99,13 +101,15 @@ class JogSession:
             ends = sorted((fresh.joint_rad(low_us), fresh.joint_rad(high_us)))
             return fresh.replaced(lower_rad=max(ends[0], -math.pi / 2), upper_rad=min(ends[1], math.pi / 2))
         except ParameterError as error:
-            raise CalibrationError(str(error)) from error
+            raise ServoCalibrationError(str(error)) from error
 
     def _marks_with_centre(self) -> list[tuple[float, float]]:
         assert self.centre_us is not None
         at_zero = [pulse for angle, pulse in self.angles if abs(angle) < 1e-6]
         if at_zero and abs(at_zero[0] - self.centre_us) > 5.0:
-            raise CalibrationError(f"angle 0 was recorded at {at_zero[0]:g} us and the centre at {self.centre_us:g} us")
+            raise ServoCalibrationError(
+                f"angle 0 was recorded at {at_zero[0]:g} us and the centre at {self.centre_us:g} us"
+            )
         return [mark for mark in self.angles if abs(mark[0]) >= 1e-6] + [(0.0, self.centre_us)]
 
     def table(self) -> list[str]:

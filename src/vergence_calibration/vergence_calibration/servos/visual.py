@@ -12,7 +12,7 @@ from vergence_calibration.lost_motion import staircase
 from vergence_calibration.servos.axis_response import AxisResponse, axis_response, calibrated
 from vergence_rig.camera import CameraModel
 from vergence_rig.parameters import Parameters, parameter
-from vergence_servo.calibration import CalibrationError, ServoCalibration
+from vergence_servo.calibration import ServoCalibration, ServoCalibrationError
 
 _EYES_OF_JOINT = {"pan_left": ("left",), "pan_right": ("right",), "tilt": ("left", "right")}
 
@@ -44,7 +44,7 @@ def calibrate_axis(
     parameters: VisualParameters,
     say: Callable[[str], None],
 ) -> AxisResponse:
-    """Move one joint in a staircase and return its response. Raises CalibrationError, NoMotionSeenError."""
+    """Move one joint in a staircase and return its response. Raises ServoCalibrationError, NoMotionSeenError."""
     rest = dict.fromkeys(_EYES_OF_JOINT, 0.0)
     reference = head.look(rest)
     pulses_us: list[float] = []
@@ -80,10 +80,10 @@ def calibrate_head(
     parameters: VisualParameters,
     say: Callable[[str], None],
 ) -> dict[str, ServoCalibration]:
-    """Return new calibrations of the joints in `servos`. Raises CalibrationError, NoMotionSeenError."""
+    """Return new calibrations of the joints in `servos`. Raises ServoCalibrationError, NoMotionSeenError."""
     for joint in servos:
         if joint not in _EYES_OF_JOINT:
-            raise CalibrationError(f"joint is {joint!r}: allowed is one of {', '.join(_EYES_OF_JOINT)}")
+            raise ServoCalibrationError(f"joint is {joint!r}: allowed is one of {', '.join(_EYES_OF_JOINT)}")
     responses = {joint: calibrate_axis(head, joint, servo, cameras, parameters, say) for joint, servo in servos.items()}
     offsets = pan_offsets_rad(head, cameras, baseline_m, parameters.far_m) if parameters.far_m > 0 else {}
     fresh = {}

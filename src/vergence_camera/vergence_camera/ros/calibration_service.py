@@ -8,7 +8,7 @@ from std_msgs.msg import Header
 
 from vergence_camera.camera_info import (
     Calibration,
-    CalibrationError,
+    CameraCalibrationError,
     calibration_path,
     load_calibration,
     save_calibration,
@@ -29,7 +29,7 @@ class NodeCalibration:
         if url or self._path.exists():
             try:
                 self._calibration = load_calibration(self._path)
-            except CalibrationError as error:
+            except CameraCalibrationError as error:
                 self._trouble = f"{error}: camera_info is blank"
                 node.get_logger().warning(self._trouble)
         self._size = (0, 0)
@@ -74,12 +74,12 @@ class NodeCalibration:
         try:
             calibration = calibration_from_message(request.camera_info, self._name)
             if self._size not in ((0, 0), (calibration.width_px, calibration.height_px)):
-                raise CalibrationError(
+                raise CameraCalibrationError(
                     f"image size is {calibration.width_px}x{calibration.height_px}: allowed is what the camera "
                     f"gives, {self._size[0]}x{self._size[1]}"
                 )
             save_calibration(calibration, self._path)
-        except (CalibrationError, OSError) as error:
+        except (CameraCalibrationError, OSError) as error:
             response.success, response.status_message = False, str(error)
             return response
         self._calibration = calibration

@@ -45,7 +45,7 @@ def camera_info_message(calibration: Calibration | None, width_px: int, height_p
 
 
 def calibration_from_message(message: CameraInfo, name: str) -> Calibration:
-    """Return the calibration that a message carries; raise CalibrationError if it carries none."""
+    """Return the calibration that a message carries; raise CameraCalibrationError if it carries none."""
     return Calibration(
         width_px=int(message.width),
         height_px=int(message.height),

@@ -28,7 +28,7 @@ from vergence_gaze.parameters import GROUPS, GazeNodeParameters
 from vergence_gaze.ros import gaze_messages as convert
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack, VergenceError
-from vergence_rig.camera import CameraError, CameraModel
+from vergence_rig.camera import CameraModel, CameraModelError
 from vergence_rig.rig import load_rig
 
 _FEEDBACK_EVERY = 10
@@ -114,7 +114,7 @@ class GazeControllerNode(Node):
     def _on_camera(self, message: CameraInfo, left: bool) -> None:
         try:
             model = convert.camera_model(message)
-        except CameraError:
+        except CameraModelError:
             return  # not calibrated: the rig's own figures stay
         if left:
             self._left = model

@@ -129,7 +129,7 @@ def eye_rotation(message: EyeRotation) -> EyeRotationReading:
 
 
 def camera_model(message: CameraInfo) -> CameraModel:
-    """Return the camera of a CameraInfo; raises CameraError if it is not calibrated."""
+    """Return the camera of a CameraInfo; raises CameraModelError if it is not calibrated."""
     return CameraModel.from_camera_info_values(
         message.width, message.height, message.k, message.d, message.distortion_model
     )

@@ -20,7 +20,7 @@ from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_nanoseconds
 from vergence_rig.rig import JOINT_NAMES, load_rig
-from vergence_servo.calibration import CalibrationError, load_servos, servo_limits
+from vergence_servo.calibration import ServoCalibrationError, load_servos, servo_limits
 from vergence_servo.command_guard import (
     CommandRefusedError,
     StampGuard,
@@ -54,7 +54,7 @@ class ServoNode(Node):
         rig = load_rig(values.rig)
         for name in values.joints:
             if name not in servos:
-                raise CalibrationError(f"joint '{name}' has no servo: servos.yaml has {', '.join(servos)}")
+                raise ServoCalibrationError(f"joint '{name}' has no servo: servos.yaml has {', '.join(servos)}")
         limits = {
             name: servo_limits(name, servos[name], rig.joints[name] if name in JOINT_NAMES else None)
             for name in values.joints
