@@ -24,10 +24,10 @@ from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.ros import gaze_messages
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import EdgeMetricNodeParameters
-from vergence_metric.pairs.joint_history import JointHistory
 from vergence_metric.pairs.viewing_angles import angular_disparity
 from vergence_metric.ros import metric_messages
 from vergence_rig.camera import CameraModel
+from vergence_rig.joint_history import JointHistory
 from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_sim.optics import Lens
 from vergence_sim.photo.pair import PhotoPoint
@@ -96,7 +96,7 @@ class MetricOfPairs:
         edges = metric_messages.edge_message(edge, verged, header, skew_s)
         now_ns = _ns(left_stamp_s)
         eyes = self._joints.at(now_ns, _ns(right_stamp_s))
-        passed = self._joints.told_between(now_ns - _LOOK_BACK_NS, now_ns)
+        passed = self._joints.samples_between(now_ns - _LOOK_BACK_NS, now_ns)
         track = measurement.track(edge, left_stamp_s, eyes, models, [(ns * 1e-9, angles) for ns, angles in passed])
         angular = angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
         tracked = metric_messages.track_message(track, edge, angular, header, skew_s)

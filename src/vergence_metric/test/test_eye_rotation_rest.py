@@ -13,9 +13,9 @@ from vergence_metric.eye_rotation.encoder import EyeRotationStatus, VisualEncode
 from vergence_metric.eye_rotation.pair_choice import PairChoice
 from vergence_metric.eye_rotation.parameters import EncoderParameters
 from vergence_metric.eye_rotation.resting_pairs import measure_pair
-from vergence_metric.pairs.joint_history import JointHistory
 from vergence_metric.pairs.pairing import Pair
 from vergence_rig.camera import CameraModel
+from vergence_rig.joint_history import JointHistory
 from vergence_rig.rig import JOINT_NAMES, default_rig
 
 MS = 1_000_000

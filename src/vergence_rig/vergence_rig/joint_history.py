@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,32 +12,30 @@ from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import JOINT_NAMES
 
 Array = npt.NDArray[np.float64]
-Stamp = TypeVar("Stamp", int, float)
-
 _LARGEST_COUNT = 4096
 
 
 class JointSample(NamedTuple):
     """Joint angles (3,) [rad] in the order of JOINT_NAMES, and their stamp."""
 
-    stamp: int | float
+    stamp: float
     angles_rad: Array
 
 
-class JointHistory(Generic[Stamp]):
+class JointHistory:
     """Keeps the joint states of the last seconds and interpolates between them by straight lines.
 
-    One thread may add while others read.
+    One thread may add while others read. Stamps may be whole numbers: they are never turned into floats.
 
     Args:
         keep: how long a state is kept, in the unit of the stamps; the defaults are for nanoseconds.
         hold: for how long after the newest state its angles still stand for the present ones.
     """
 
-    def __init__(self, keep: Stamp = 2_000_000_000, hold: Stamp = 200_000_000) -> None:
+    def __init__(self, keep: float = 2_000_000_000, hold: float = 200_000_000) -> None:
         self._keep, self._hold = keep, hold
         # Replaced as a whole at every addition, so that readers on other threads need no lock.
-        self._kept: tuple[list[Stamp], list[JointSample]] = ([], [])
+        self._kept: tuple[list[float], list[JointSample]] = ([], [])
 
     @property
     def known(self) -> bool:
@@ -49,7 +47,7 @@ class JointHistory(Generic[Stamp]):
         """The newest state; raises IndexError before the first."""
         return self._kept[1][-1]
 
-    def add(self, stamp: Stamp, names: Sequence[str], positions_rad: Sequence[float]) -> bool:
+    def add(self, stamp: float, names: Sequence[str], positions_rad: Sequence[float]) -> bool:
         """Add a joint state; other joints than the three are ignored.
 
         Returns False, and adds nothing, if a joint is missing or not finite, or if the stamp is the newest one's. A
@@ -72,53 +70,59 @@ class JointHistory(Generic[Stamp]):
         """Remove all states."""
         self._kept = ([], [])
 
-    def covers(self, stamp: Stamp) -> bool:
+    def covers(self, stamp: float) -> bool:
         """Return whether the angles at `stamp` are known: not before the first state, nor `hold` after the last."""
         stamps, _ = self._kept
         return bool(stamps) and stamps[0] <= stamp <= stamps[-1] + self._hold
 
-    def at(self, left_stamp: Stamp, right_stamp: Stamp) -> EyeAngles | None:
+    def at(self, left_stamp: float, right_stamp: float) -> EyeAngles | None:
         """Return the left pan and the tilt at the left image's stamp and the right pan at the right one's.
 
         None for a stamp that is not covered. Without any joint state the eyes are assumed to look straight ahead, so
         that images alone can be measured.
         """
-        if not self.known:
+        kept = self._kept
+        stamps, _ = kept
+        if not stamps:
             return EyeAngles(0.0, 0.0, 0.0)
-        if not (self.covers(left_stamp) and self.covers(right_stamp)):
+        if not all(stamps[0] <= stamp <= stamps[-1] + self._hold for stamp in (left_stamp, right_stamp)):
             return None
-        left, right = self._interpolated(left_stamp), self._interpolated(right_stamp)
+        left, right = (_at(*_bracket(kept, stamp), stamp) for stamp in (left_stamp, right_stamp))
         return EyeAngles(float(left[0]), float(right[1]), float(left[2]))
 
-    def samples_between(self, begin: Stamp, end: Stamp) -> list[tuple[Stamp, EyeAngles]]:
+    def samples_between(self, begin: float, end: float) -> list[tuple[float, EyeAngles]]:
         """Return the states after `begin` and before `end`, with their stamps, in order."""
         stamps, samples = self._kept
         first, last = bisect_right(stamps, begin), bisect_left(stamps, end)
         chosen = zip(stamps[first:last], samples[first:last], strict=True)
         return [(stamp, EyeAngles(*(float(angle) for angle in sample.angles_rad))) for stamp, sample in chosen]
 
-    def spanning(self, begin: Stamp, end: Stamp) -> list[JointSample]:
+    def spanning(self, begin: float, end: float) -> list[JointSample]:
         """Return the states between two stamps and the two that enclose them, as far as there are any."""
         stamps, samples = self._kept
         return samples[max(bisect_right(stamps, begin) - 1, 0) : bisect_left(stamps, end) + 1]
 
-    def bracket(self, stamp: Stamp) -> tuple[JointSample, JointSample]:
+    def bracket(self, stamp: float) -> tuple[JointSample, JointSample]:
         """Return the last state before `stamp` and the first that is not; beyond an end, that end twice.
 
         Raises IndexError without any state.
         """
-        stamps, samples = self._kept
-        after = bisect_left(stamps, stamp)
-        if after in (0, len(stamps)):
-            end = samples[min(after, len(samples) - 1)]
-            return end, end
-        return samples[after - 1], samples[after]
+        return _bracket(self._kept, stamp)
 
-    def _interpolated(self, stamp: Stamp) -> Array:
-        before, after = self.bracket(stamp)
-        if before is after or after.stamp == stamp:
-            return after.angles_rad
-        return interpolated(before, after, stamp)
+
+def _bracket(kept: tuple[list[float], list[JointSample]], stamp: float) -> tuple[JointSample, JointSample]:
+    stamps, samples = kept
+    after = bisect_left(stamps, stamp)
+    if after in (0, len(stamps)):
+        end = samples[min(after, len(samples) - 1)]
+        return end, end
+    return samples[after - 1], samples[after]
+
+
+def _at(before: JointSample, after: JointSample, stamp: float) -> Array:
+    if before is after or after.stamp == stamp:
+        return after.angles_rad
+    return interpolated(before, after, stamp)
 
 
 def interpolated(before: JointSample, after: JointSample, stamp: float) -> Array:

@@ -8,9 +8,9 @@ import numpy.typing as npt
 
 from vergence_metric.eye_rotation.encoder import EyeRotationReading, EyeRotationStatus, VisualEncoder, not_measured
 from vergence_metric.eye_rotation.rest import joints_moved, view_moved
-from vergence_metric.pairs.joint_history import JointHistory
 from vergence_metric.pairs.pairing import Pair
 from vergence_rig.camera import CameraModel
+from vergence_rig.joint_history import JointHistory
 
 
 def measure_pair(

@@ -2,8 +2,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric.pairs.joint_history import JointHistory
 from vergence_rig.geometry import EyeAngles
+from vergence_rig.joint_history import JointHistory, interpolated
 
 NAMES = ("tilt", "pan_left", "pan_right")
 MS = 1_000_000
@@ -28,7 +28,7 @@ def test_each_eye_is_read_at_its_own_stamp(left_ns: int, right_ns: int) -> None:
     assert eyes.pan_right_rad == pytest.approx(-2.0 * right_ns * 1e-9, abs=1e-12)
 
 
-def test_a_head_that_never_told_its_joints_looks_straight_ahead() -> None:
+def test_without_joint_states_the_eyes_look_straight_ahead() -> None:
     assert JointHistory().at(5, 6) == EyeAngles(0.0, 0.0, 0.0)
 
 
@@ -63,8 +63,50 @@ def test_the_past_is_forgotten_after_a_while() -> None:
     assert history.at(2500 * MS, 2500 * MS) is not None
 
 
-def test_what_was_told_between_two_stamps_is_given_in_order() -> None:
-    told = turning().told_between(30 * MS, 60 * MS)
-    assert [stamp_ns for stamp_ns, _ in told] == [40 * MS, 50 * MS]
-    assert told[0][1] == EyeAngles(0.04, -0.08, 0.02)
-    assert JointHistory().told_between(0, 100 * MS) == []
+def test_the_states_between_two_stamps_are_given_in_order() -> None:
+    between = turning().samples_between(30 * MS, 60 * MS)
+    assert [stamp_ns for stamp_ns, _ in between] == [40 * MS, 50 * MS]
+    assert between[0][1] == EyeAngles(0.04, -0.08, 0.02)
+    assert JointHistory().samples_between(0, 100 * MS) == []
+
+
+@pytest.mark.parametrize("odd", [float("nan"), float("inf")])
+def test_a_state_with_an_angle_that_is_no_number_is_ignored(odd: float) -> None:
+    history = turning()
+    assert not history.add(200 * MS, NAMES, (0.0, odd, 0.0))
+    assert history.newest.stamp == 100 * MS
+
+
+def test_a_second_state_of_one_stamp_is_ignored() -> None:
+    history = turning()
+    assert not history.add(100 * MS, NAMES, (1.0, 1.0, 1.0))
+    eyes = history.at(100 * MS, 100 * MS)
+    assert eyes is not None
+    assert eyes.pan_left_rad == pytest.approx(0.1)
+
+
+def test_seconds_serve_as_stamps_too() -> None:
+    history = JointHistory(keep=1.0, hold=0.1)
+    for i in range(30):
+        history.add(0.1 * i, NAMES, (0.0, 0.2 * i, 0.0))
+    assert history.covers(2.0)
+    assert not history.covers(1.5)
+    before, after = history.bracket(2.05)
+    assert (before.stamp, after.stamp) == (2.0, 2.1)
+    assert interpolated(before, after, 2.05)[0] == pytest.approx(4.1)
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "stamps"),
+    [(15, 35, [10, 20, 30, 40]), (20, 30, [20, 30]), (-5, 5, [0, 10]), (95, 300, [90, 100])],
+)
+def test_a_span_takes_in_the_states_that_enclose_it(begin: int, end: int, stamps: list[int]) -> None:
+    assert [sample.stamp for sample in turning().spanning(begin * MS, end * MS)] == [stamp * MS for stamp in stamps]
+
+
+def test_beyond_an_end_that_end_brackets() -> None:
+    history = turning()
+    assert [sample.stamp for sample in history.bracket(-1)] == [0, 0]
+    assert [sample.stamp for sample in history.bracket(200 * MS)] == [100 * MS] * 2
+    history.clear()
+    assert not history.known
