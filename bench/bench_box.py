@@ -16,7 +16,7 @@ from training.scenes import Stage
 from vergence_metric.boxes import BoxMeasurement, BoxStatus, BoxVergenceResult
 from vergence_metric.boxes.association import associate
 from vergence_metric.boxes.pair_geometry import PairGeometry
-from vergence_metric.boxes.parameters import BoxMetricNodeParameters
+from vergence_metric.boxes.parameters import BoxMetricParameters
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, from_version_vergence, gaze_for_point
 from vergence_rig.rig import default_rig
@@ -99,8 +99,11 @@ def _cases(say: Callable[[str], None]) -> Iterator[Case]:
     cameras = CameraModel(rig.left_camera), CameraModel(rig.right_camera)
     for seed in WORLDS:
         rng = np.random.default_rng(seed)
-        simulator = Simulator(SimParameters(world_seed=seed, seed=seed, servo="ideal", distortion=_NO_DISTORTION), rig)
-        measurement = BoxMeasurement(BoxMetricNodeParameters(), rig.baseline_m)
+        simulator = Simulator(
+            SimParameters.of({"world.seed": seed, "seed": seed, "servo": "ideal", "camera.distortion": _NO_DISTORTION}),
+            rig,
+        )
+        measurement = BoxMeasurement(BoxMetricParameters(), rig.baseline_m)
         for number in range(VIEWS):
             distance = float(np.exp(rng.uniform(math.log(0.25), math.log(1.4))))
             point = distance * np.array([1.0, rng.uniform(-0.5, 0.5), rng.uniform(-0.35, 0.35)])
@@ -162,7 +165,7 @@ def _wrong_pairs(say: Callable[[str], None]) -> tuple[int, int]:
     """Count pairs, not called ambiguous, whose boxes are two different cubes."""
     rig = default_rig()
     cameras = CameraModel(rig.left_camera), CameraModel(rig.right_camera)
-    parameters = BoxMetricNodeParameters()
+    parameters = BoxMetricParameters()
     detector = BoxMeasurement(parameters, rig.baseline_m).detector
     wrong = pairs = ambiguous = 0
     for seed in ALIKE_SEEDS:
@@ -170,7 +173,7 @@ def _wrong_pairs(say: Callable[[str], None]) -> tuple[int, int]:
         for view in stage.stereo_views(ALIKE_VIEWS, 2 + seed % 2):
             left, right = (detector.detect(image) for image in view.images)
             geometry = PairGeometry(*cameras, EyeAngles(*view.angles_rad))
-            found = associate(left.boxes(), right.boxes(), parameters, 0.0, view.images, geometry)
+            found = associate(left.boxes(), right.boxes(), parameters.association, 0.0, view.images, geometry)
             for pair in found.pairs:
                 owners = [
                     _owner(box.xyxy_px, boxes)

@@ -136,12 +136,14 @@ def stereo_pairs(
 
 def _rendered_pairs() -> tuple[list[EdgeMetricResult], list[EdgeMetricResult]]:
     """Return what is measured on a rendered cube that fills the 50 px window, degraded as hard pairs are."""
-    hard = SimParameters(
-        noise_sigma=HARD.noise_sigma,
-        right_gain=HARD.gain,
-        left_roll_rad=0.0,
-        right_roll_rad=HARD.roll_rad,
-        right_pitch_rad=0.0,
+    hard = SimParameters.of(
+        {
+            "camera.noise_sigma": HARD.noise_sigma,
+            "right_camera.gain": HARD.gain,
+            "left_camera.roll_rad": 0.0,
+            "right_camera.roll_rad": HARD.roll_rad,
+            "right_camera.pitch_rad": 0.0,
+        }
     )
     errors = [0.0, *np.deg2rad([1.0, -1.2, 2.5, -3.0, 5.0])]
     verged: list[EdgeMetricResult] = []

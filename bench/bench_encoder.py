@@ -37,7 +37,7 @@ def run(say: Say) -> list[Row]:
     said: dict[bool, list[np.ndarray]] = {True: [], False: []}
     distances: list[float] = []
     for world in WORLDS:
-        with closing(RenderedRooms(rig, SimParameters(world_seed=world, seed=world))) as rooms:
+        with closing(RenderedRooms(rig, SimParameters.of({"world.seed": world, "seed": world}))) as rooms:
             for number, distance in enumerate(DISTANCES_M):
                 for scenario in scenarios.at_distance(PER_WORLD, distance, None, seed=100 * world + number):
                     rooms.begin(scenario.target(0.0), scenario.seed)

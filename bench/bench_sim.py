@@ -30,7 +30,7 @@ def run(say: Callable[[str], None]) -> list[Row]:
         began_s, sim_began_s = time.perf_counter(), realistic.time_s
         _follow(realistic, _PAIRS)
         factor = (realistic.time_s - sim_began_s) / (time.perf_counter() - began_s)
-        blind = Simulator(SimParameters(motion="sinusoid", motion_y_m=0.1), render=False)
+        blind = Simulator(SimParameters.of({"motion.kind": "sinusoid", "motion.y_m": 0.1}), render=False)
         began_s = time.perf_counter()
         for step in range(_BLIND_STEPS):
             blind.advance_to(step * 0.01)

@@ -14,7 +14,7 @@ from vergence_gaze.testing.fake_head import FakeHead
 from vergence_metric.eye_rotation.encoder import EyeRotationReading as Reading
 from vergence_metric.eye_rotation.encoder import VisualEncoder
 from vergence_metric.eye_rotation.parameters import EyeRotationNodeParameters
-from vergence_metric.eye_rotation.relative_rotation import RigDoubt, relative_rotation
+from vergence_metric.eye_rotation.relative_rotation import RigPrior, relative_rotation
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, rotation_rig_from_eye
 from vergence_rig.rig import JOINT_NAMES, Rig
@@ -87,7 +87,7 @@ class DrawnFeatures:
             focal, lens = self._bend[eye]
             square = (view**2).sum(axis=1, keepdims=True)
             views.append(view * (1.0 + focal + lens * square) + self._centre[eye] / focal_px)
-        doubt = RigDoubt(
+        doubt = RigPrior(
             focal=PARAMETERS.focal_doubt,
             distortion=PARAMETERS.distortion_doubt,
             centre_rad=PARAMETERS.centre_doubt_px / focal_px,
@@ -115,7 +115,7 @@ class RenderedRooms:
                 spec.width_px,
                 spec.height_px,
                 [spec.fx_px, 0, spec.cx_px, 0, spec.fy_px, spec.cy_px, 0, 0, 1],
-                list(parameters.distortion),
+                list(parameters.camera.distortion),
             )
             for spec in (rig.left_camera, rig.right_camera)
         ]

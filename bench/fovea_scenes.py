@@ -40,14 +40,16 @@ def scenes(
     """
     rng = np.random.default_rng(seed)
     for world in range(worlds):
-        parameters = SimParameters(
-            servo="ideal",
-            seed=world,
-            world_seed=world,
-            left_roll_rad=0.0,
-            right_roll_rad=0.0,
-            right_pitch_rad=0.0,
-            distortion=(0.0,) * 5,
+        parameters = SimParameters.of(
+            {
+                "servo": "ideal",
+                "seed": world,
+                "world.seed": world,
+                "left_camera.roll_rad": 0.0,
+                "right_camera.roll_rad": 0.0,
+                "right_camera.pitch_rad": 0.0,
+                "camera.distortion": (0.0,) * 5,
+            }
         )
         simulator = Simulator(parameters)
         try:

@@ -72,13 +72,13 @@ class ProcessHead:
         self._recorder.look_at(of_class(TARGET, _LIMIT_S), self._alive)
         self._stage.settle()
         x, y, z = (float(value) for value in velocity_m_s)
-        ramp = {"motion": "ramp", "motion_x_m": x, "motion_y_m": y, "motion_z_m": z}
+        ramp = {"motion.kind": "ramp", "motion.x_m": x, "motion.y_m": y, "motion.z_m": z}
         began_s = self._recorder.now_s() - moves_from_s
         self._recorder.set_parameters("sim_node", ramp, self._alive)
         self._run_until(began_s + scenario.duration_s)
         trace = self._trace(began_s, scenario.duration_s, math.nan)
         self._stage.hide("target")
-        self._recorder.set_parameters("sim_node", {"motion": "static"}, self._alive)
+        self._recorder.set_parameters("sim_node", {"motion.kind": "static"}, self._alive)
         return trace
 
     def latency_s(self) -> float:

@@ -54,7 +54,7 @@ def frames(
     """Yield error and pair for `places` targets in each world, each seen with every error."""
     rng = np.random.default_rng(seed)
     for world in worlds:
-        with closing(Simulator(parameters.replaced(world_seed=world, seed=seed))) as simulator:
+        with closing(Simulator(parameters.replaced({"world.seed": world, "seed": seed}))) as simulator:
             for i in range(places):
                 point = fixated_surface(simulator, TARGETS[i % len(TARGETS)], random_place(rng))
                 for error_rad in errors_rad:

@@ -36,11 +36,11 @@ class Case:
 
 CASES = [
     Case("SG90, MG995, 15 ms", SimParameters()),
-    Case("the same, 40 ms", SimParameters(servo_latency_s=0.04)),
-    Case("the same, 80 ms, left stamps 20 ms late", SimParameters(servo_latency_s=0.08), (0.02, 0.0)),
-    Case("the same, 120 ms, camera 90 ms", SimParameters(servo_latency_s=0.12, latency_s=0.09)),
-    Case("the same at 15 Hz, 60 ms", SimParameters(servo_latency_s=0.06, frame_rate_hz=15.0)),
-    Case("ideal, 30 ms", SimParameters(preset="ideal", servo_latency_s=0.03)),
+    Case("the same, 40 ms", SimParameters.of({"servo_latency_s": 0.04})),
+    Case("the same, 80 ms, left stamps 20 ms late", SimParameters.of({"servo_latency_s": 0.08}), (0.02, 0.0)),
+    Case("the same, 120 ms, camera 90 ms", SimParameters.of({"servo_latency_s": 0.12, "camera.latency_s": 0.09})),
+    Case("the same at 15 Hz, 60 ms", SimParameters.of({"servo_latency_s": 0.06, "camera.frame_rate_hz": 15.0})),
+    Case("ideal, 30 ms", SimParameters.of({"preset": "ideal", "servo_latency_s": 0.03})),
 ]
 
 
@@ -75,7 +75,7 @@ class LockstepHead:
         for move in moves:
             commands.append((self._now_s, move.angle_rad))
             self.simulator.command({joint: pose[joint] + move.angle_rad}, self._now_s)
-            wait_s = move.rest_s + move.share / self.simulator.parameters.frame_rate_hz
+            wait_s = move.rest_s + move.share / self.simulator.parameters.camera.frame_rate_hz
             reports += self._run(wait_s, joint, log.frames)
         return AxisLog(joint, np.array(commands), np.array(reports), log.frames)
 
@@ -88,7 +88,7 @@ class LockstepHead:
             if event.kind == "joints":
                 reports.append((event.due_s, self.simulator.joint_states()[joint]))
             elif event.kind == "expose":
-                arrival_s = event.due_s + self.simulator.parameters.latency_s
+                arrival_s = event.due_s + self.simulator.parameters.camera.latency_s
                 picture = shrunk(self.simulator.view(event.eye))
                 frames[event.eye].add(event.due_s + self._late_s[event.eye], arrival_s, picture)
         return reports
@@ -101,7 +101,9 @@ def row(case: Case) -> str:
     servos = {name: joint.servo for name, joint in head.simulator.head.rig.joints.items()}
     errors = _latency_errors(found, {name: servo.command_latency_s for name, servo in servos.items()})
     late = [found.latencies.stamp_late_s[eye].value_s - case.stamps_late_s[i] for i, eye in enumerate(EYES)]
-    waits = [found.latencies.exposure_to_arrival_s[eye].value_s - head.simulator.parameters.latency_s for eye in EYES]
+    waits = [
+        found.latencies.exposure_to_arrival_s[eye].value_s - head.simulator.parameters.camera.latency_s for eye in EYES
+    ]
     gains = [gain.deviation for gain in found.gains]
     lost = [
         math.degrees(gain.loop.lost - servos[gain.joint].dead_band_rad - servos[gain.joint].backlash_rad)

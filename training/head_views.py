@@ -37,14 +37,16 @@ def head_views(seed: int, count: int) -> Iterator[View]:
 
 
 def _parameters(rng: np.random.Generator, seed: int) -> SimParameters:
-    return SimParameters(
-        world_seed=seed,
-        seed=seed,
-        servo="ideal",
-        distortion=(0.0,) * 5 if rng.random() < 0.5 else SimParameters().distortion,
-        light=float(np.exp(rng.uniform(math.log(0.4), math.log(1.4)))),
-        samples=int(rng.choice([0, 0, 0, 4])),
-        look_alikes=int(rng.integers(0, 5)),
+    return SimParameters.of(
+        {
+            "world.seed": seed,
+            "seed": seed,
+            "servo": "ideal",
+            "camera.distortion": (0.0,) * 5 if rng.random() < 0.5 else SimParameters().camera.distortion,
+            "world.light": float(np.exp(rng.uniform(math.log(0.4), math.log(1.4)))),
+            "camera.samples_per_pixel": int(rng.choice([0, 0, 0, 4])),
+            "world.look_alikes": int(rng.integers(0, 5)),
+        }
     )
 
 
@@ -53,10 +55,12 @@ def _pair(simulator: Simulator, rng: np.random.Generator) -> list[View]:
     turned = rng.random() >= _UPRIGHT_SHARE
     simulator.set_parameters(
         simulator.parameters.replaced(
-            target_yaw_rad=float(rng.uniform(-math.pi, math.pi)) if turned else 0.0,
-            noise_sigma=float(rng.uniform(0.5, 4.5)),
-            jpeg_quality=int(rng.integers(75, 96)),
-            right_gain=float(rng.uniform(0.8, 1.15)),
+            {
+                "target.yaw_rad": float(rng.uniform(-math.pi, math.pi)) if turned else 0.0,
+                "camera.noise_sigma": float(rng.uniform(0.5, 4.5)),
+                "camera.jpeg_quality": int(rng.integers(75, 96)),
+                "right_camera.gain": float(rng.uniform(0.8, 1.15)),
+            }
         )
     )
     baseline_m = simulator.rig.baseline_m

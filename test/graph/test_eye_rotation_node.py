@@ -124,7 +124,7 @@ def test_the_true_vergence_is_read_although_the_joints_are_off(graph: Any, seen:
     assert message.vergence_rad == pytest.approx(true, abs=math.radians(0.12))
     assert abs(message.vergence_rad - true) < 4.0 * message.sigma_rad < math.radians(0.3)
     assert message.corrections_rad[0] == pytest.approx(message.vergence_rad - message.joint_vergence_rad)
-    assert message.corrections_rad[2] == pytest.approx(SIMULATED.right_pitch_rad, abs=2e-3)
+    assert message.corrections_rad[2] == pytest.approx(SIMULATED.right_camera.pitch_rad, abs=2e-3)
     assert message.covariance_rad2[0] == pytest.approx(message.sigma_rad**2)
     assert message.header.frame_id == "left"
     assert to_nanoseconds(message.header.stamp) <= head.stamp_ns

@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.graph, pytest.mark.usefixtures("opengl")]
 @pytest.fixture
 def sim(graph: Any) -> SimNode:
     # Slow frames: many tests may share this machine.
-    node: SimNode = graph.start(SimNode, frame_rate_hz=10.0, right_clock_offset_s=0.02)
+    node: SimNode = graph.start(SimNode, **{"camera.frame_rate_hz": 10.0, "right_camera.clock_offset_s": 0.02})
     return node
 
 
@@ -122,9 +122,9 @@ def test_parameters_change_while_it_runs(graph: Any, sim: SimNode) -> None:
 
     for _ in range(3):
         assert not clean(graph.wait(graph.message(Image, "left/image_raw", qos=IMAGE_QOS)))
-    result = graph.set_parameters(sim, noise_sigma=0.0, jpeg_quality=0)
+    result = graph.set_parameters(sim, **{"camera.noise_sigma": 0.0, "camera.jpeg_quality": 0})
     assert result.successful
     graph.wait(graph.message(Image, "left/image_raw", clean, qos=IMAGE_QOS))
-    refused = graph.set_parameters(sim, noise_sigma=0.0, motion="backwards")
+    refused = graph.set_parameters(sim, **{"camera.noise_sigma": 0.0, "motion.kind": "backwards"})
     assert not refused.successful
     assert "backwards" in refused.reason

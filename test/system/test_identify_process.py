@@ -33,7 +33,7 @@ def processes(domain_id: int, tmp_path: Path) -> Iterator[ProcessGroup]:
 
 def start_head(processes: ProcessGroup, *remappings: str) -> None:
     # Few frames a second: many tests may share this machine.
-    parameters = {"servo_latency_s": SLOW_S, "frame_rate_hz": 15.0}
+    parameters = {"servo_latency_s": SLOW_S, "camera.frame_rate_hz": 15.0}
     processes.start("sim", NodeCommand("vergence_sim", "sim_node", parameters, remappings))
 
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from vergence_rig.parameters import ParameterError
 from vergence_sim.motion import offset_m
-from vergence_sim.parameters import MOTIONS, SimParameters
+from vergence_sim.parameters import MOTIONS, MotionParameters
 
 
-def script(motion, **values):
-    return SimParameters(motion=motion, motion_x_m=0.1, motion_y_m=-0.2, motion_z_m=0.3, **values)
+def script(kind, **values):
+    return MotionParameters(kind, x_m=0.1, y_m=-0.2, z_m=0.3, **values)
 
 
 @pytest.mark.parametrize(
@@ -27,7 +27,7 @@ def test_scripts_move_by_their_extent(motion, elapsed_s, share):
 @settings(deadline=None, max_examples=50)
 @given(st.floats(0.01, 5), st.floats(0, 20))
 def test_a_sinusoid_repeats_and_turns_over(frequency_hz, elapsed_s):
-    sinusoid = script("sinusoid", motion_frequency_hz=frequency_hz)
+    sinusoid = script("sinusoid", frequency_hz=frequency_hz)
     here, period_s = offset_m(sinusoid, elapsed_s), 1 / frequency_hz
     assert offset_m(sinusoid, elapsed_s + period_s) == pytest.approx(here, abs=1e-9)
     assert offset_m(sinusoid, elapsed_s + period_s / 2) == pytest.approx(-here, abs=1e-9)

@@ -46,7 +46,7 @@ def test_no_corner_is_left_without_a_view():
 def test_noise_has_its_deviation_and_differs_from_frame_to_frame():
     sensor = Sensor(np.random.default_rng(0), (480, 640), right=False)
     grey = np.full((480, 640, 3), 128, np.uint8)
-    parameters = SimParameters.ideal().replaced(noise_sigma=4.0)
+    parameters = SimParameters.ideal().replaced({"camera.noise_sigma": 4.0})
     first, second = sensor.apply(grey, parameters), sensor.apply(grey, parameters)
     assert first.astype(float).std() == pytest.approx(4.0, rel=0.03)
     assert not np.array_equal(first, second)
@@ -54,7 +54,9 @@ def test_noise_has_its_deviation_and_differs_from_frame_to_frame():
 
 def test_exposure_and_white_balance_are_the_right_eyes_only():
     grey = np.full((48, 64, 3), 100, np.uint8)
-    parameters = SimParameters.ideal().replaced(right_gain=1.2, right_blue_gain=0.9, right_red_gain=1.1)
+    parameters = SimParameters.ideal().replaced(
+        {"right_camera.gain": 1.2, "right_camera.blue_gain": 0.9, "right_camera.red_gain": 1.1}
+    )
     right = Sensor(np.random.default_rng(0), (48, 64), right=True).apply(grey, parameters)
     left = Sensor(np.random.default_rng(0), (48, 64), right=False).apply(grey, parameters)
     assert right[0, 0].tolist() == [108, 120, 132]
@@ -65,4 +67,5 @@ def test_jpeg_leaves_its_marks():
     noisy = np.random.default_rng(0).integers(0, 255, (48, 64, 3), dtype=np.uint8)
     sensor = Sensor(np.random.default_rng(0), (48, 64), right=False)
     assert np.array_equal(sensor.apply(noisy, SimParameters.ideal()), noisy)
-    assert not np.array_equal(sensor.apply(noisy, SimParameters.ideal().replaced(jpeg_quality=60)), noisy)
+    compressed = SimParameters.ideal().replaced({"camera.jpeg_quality": 60})
+    assert not np.array_equal(sensor.apply(noisy, compressed), noisy)

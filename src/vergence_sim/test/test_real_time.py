@@ -21,7 +21,9 @@ def _exposures(schedule, until_s, late_s=0.0):
 
 
 def test_the_right_eye_keeps_its_offset_and_drifts():
-    parameters = SimParameters(frame_jitter_s=0.0, right_clock_offset_s=0.007, right_clock_drift=0.001)
+    parameters = SimParameters.of(
+        {"camera.frame_jitter_s": 0.0, "right_camera.clock_offset_s": 0.007, "right_camera.clock_drift": 0.001}
+    )
     times = _exposures(Schedule(parameters, 0.0), 3.0)
     assert times["left"][1] - times["left"][0] == pytest.approx(1 / 30)
     assert times["right"][0] - times["left"][0] == pytest.approx(0.007)
@@ -31,7 +33,9 @@ def test_the_right_eye_keeps_its_offset_and_drifts():
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 1000), st.floats(0, 0.01), st.floats(-0.02, 0.02))
 def test_exposures_of_one_eye_never_change_places(seed, jitter_s, offset_s):
-    parameters = SimParameters(seed=seed, frame_jitter_s=jitter_s, right_clock_offset_s=offset_s)
+    parameters = SimParameters.of(
+        {"seed": seed, "camera.frame_jitter_s": jitter_s, "right_camera.clock_offset_s": offset_s}
+    )
     for times in _exposures(Schedule(parameters, 0.0), 1.0).values():
         assert len(times) >= 28
         assert all(later > earlier for earlier, later in itertools.pairwise(times))
@@ -49,7 +53,7 @@ def test_what_is_published_goes_out_when_it_is_due():
 
 
 def test_a_late_machine_drops_exposures_and_counts_them():
-    schedule = Schedule(SimParameters(frame_jitter_s=0.0), 0.0)
+    schedule = Schedule(SimParameters.of({"camera.frame_jitter_s": 0.0}), 0.0)
     times = _exposures(schedule, 1.0, late_s=0.2)
     assert schedule.dropped > 0
     for beats in times.values():
@@ -60,15 +64,15 @@ def test_a_late_machine_drops_exposures_and_counts_them():
 
 
 def test_joints_come_at_their_own_rate():
-    schedule = Schedule(SimParameters(joint_rate_hz=100.0), 0.0)
+    schedule = Schedule(SimParameters.of({"joint_rate_hz": 100.0}), 0.0)
     count = 0
     while schedule.next_due_s() < 0.995:
         count += schedule.pop(schedule.next_due_s()).kind == "joints"
     assert count == 100
 
 
-def test_a_late_machine_still_tells_the_joints_of_every_beat():
-    schedule = Schedule(SimParameters(joint_rate_hz=100.0), 0.0)
+def test_a_late_machine_still_publishes_the_joints_of_every_beat():
+    schedule = Schedule(SimParameters.of({"joint_rate_hz": 100.0}), 0.0)
     stamps = []
     while schedule.next_due_s() < 0.995:
         event = schedule.pop(schedule.next_due_s() + 0.2)
@@ -77,8 +81,8 @@ def test_a_late_machine_still_tells_the_joints_of_every_beat():
     assert stamps == pytest.approx([0.01 * beat for beat in range(100)])
 
 
-def test_a_machine_that_slept_does_not_tell_the_joints_of_all_that_time():
-    schedule = Schedule(SimParameters(joint_rate_hz=100.0), 0.0)
+def test_a_machine_that_slept_does_not_publish_the_joints_of_all_that_time():
+    schedule = Schedule(SimParameters.of({"joint_rate_hz": 100.0}), 0.0)
     late_s, stamps = 60.0, []
     for _ in range(300):
         event = schedule.pop(max(schedule.next_due_s(), late_s))

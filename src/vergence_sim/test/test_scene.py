@@ -11,9 +11,9 @@ from vergence_sim.parameters import SimParameters
 from vergence_sim.renderer import RenderError
 from vergence_sim.scene import HEAD_HEIGHT_M, build_scene
 from vergence_sim.simulator import Simulator, TargetError
-from vergence_sim.truth import TruthTeller
+from vergence_sim.truth import GroundTruth
 
-IDEAL = SimParameters.ideal(world_seed=2, extra_cubes=2, look_alikes=4)
+IDEAL = SimParameters.ideal({"world.seed": 2, "world.extra_cubes": 2, "world.look_alikes": 4})
 SEEN = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 
 
@@ -37,14 +37,14 @@ def test_an_untextured_room_is_furnished_alike():
 
 def test_the_same_parameters_share_one_model():
     assert build_scene(default_rig(), IDEAL, 0.8, False) is build_scene(default_rig(), IDEAL, 0.8, False)
-    other = build_scene(default_rig(), IDEAL.replaced(world_seed=3), 0.8, False)
+    other = build_scene(default_rig(), IDEAL.replaced({"world.seed": 3}), 0.8, False)
     assert not np.array_equal(other.geom_pos[:40], build_scene(default_rig(), IDEAL, 0.8, False).geom_pos[:40])
 
 
 @pytest.mark.parametrize("world_seed", range(8))
 def test_nothing_stands_where_targets_go(world_seed):
     """From the head to two metres, 35 degrees to the sides and 20 up and down, every ray is free."""
-    model = build_scene(default_rig(), SimParameters.ideal(world_seed=world_seed), 0.8, textured=False)
+    model = build_scene(default_rig(), SimParameters.ideal({"world.seed": world_seed}), 0.8, textured=False)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     head, geom = np.array([0.0, 0.0, HEAD_HEIGHT_M]), np.zeros(1, np.int32)
@@ -100,19 +100,19 @@ def test_visible_shares_are_those_of_the_segmentation(seeing):
 
 def test_the_mean_disparity_is_that_of_the_rendered_pixels(seeing):
     """For a cube turned by 40 degrees, from its pixels' own rays: cast each to the cube, project into the other eye."""
-    seeing.set_parameters(seeing.parameters.replaced(target_yaw_rad=0.7))
+    seeing.set_parameters(seeing.parameters.replaced({"target.yaw_rad": 0.7}))
     seeing.set_head({"pan_left": -0.05, "pan_right": 0.06, "tilt": 0.0})
     seeing.place_target("cube", (0.5, 0.0, 0.01))
-    teller: TruthTeller = seeing._truth
+    truth: GroundTruth = seeing._truth
     disparities = []
     for eye, other in (("left", "right"), ("right", "left")):
         rows, columns = np.nonzero(pixels_of(seeing, eye, "cube"))
-        points = teller.surface(eye, "cube", np.column_stack([columns, rows])[::7].astype(float))
-        for point in points[teller.sees(other, points)]:
-            places = {name: teller.project(name, point)[0] for name in ("left", "right")}
+        points = truth.surface(eye, "cube", np.column_stack([columns, rows])[::7].astype(float))
+        for point in points[truth.sees(other, points)]:
+            places = {name: truth.project(name, point)[0] for name in ("left", "right")}
             disparities.append(places["left"] - places["right"])
     assert seeing.truth().mean_disparity_px == pytest.approx(float(np.mean(disparities)), abs=0.5)
-    seeing.set_parameters(seeing.parameters.replaced(target_yaw_rad=0.0))
+    seeing.set_parameters(seeing.parameters.replaced({"target.yaw_rad": 0.0}))
 
 
 def test_further_cubes_are_cubes_and_can_be_put_anywhere(seeing):
@@ -131,7 +131,7 @@ def test_further_cubes_are_cubes_and_can_be_put_anywhere(seeing):
 )
 def test_an_object_that_cannot_be_put_is_refused(name, place):
     simulator = Simulator(IDEAL, render=False)
-    with pytest.raises(TargetError, match="allowed"):
+    with pytest.raises(TargetError, match="must be"):
         simulator.place_object(name, place)
 
 
@@ -143,7 +143,7 @@ def test_both_targets_can_be_seen_at_once():
 
 @pytest.mark.parametrize("kind", ["four", "die"])
 def test_the_distractor_goes_where_it_is_put_and_is_no_target(kind):
-    simulator = Simulator(SimParameters.ideal(distractor=kind), render=False)
+    simulator = Simulator(SimParameters.ideal({"world.distractor": kind}), render=False)
     simulator.place_target("cube", (0.8, 0.0, 0.0))
     boxes, truth = simulator.true_boxes("left"), simulator.truth()
     simulator.place_distractor((0.4, -0.1, 0.0))

@@ -1,12 +1,13 @@
 """The lockstep simulator: truth against closed forms, determinism, plants, pictures."""
 
-import dataclasses
 import math
+import operator
 
 import numpy as np
 import pytest
 
 from vergence_rig.geometry import gaze_for_point
+from vergence_rig.parameters import ParameterError
 from vergence_rig.rig import default_rig
 from vergence_sim.head import CommandError
 from vergence_sim.parameters import SimParameters
@@ -97,7 +98,7 @@ def test_boxes_are_cut_at_the_border_and_absent_outside(blind):
 
 
 def test_a_commanded_servo_takes_its_time_and_stops_short():
-    simulator = Simulator(SimParameters(servo="sg90"), render=False)
+    simulator = Simulator(SimParameters.of({"servo": "sg90"}), render=False)
     servo = simulator.head.rig.pan_left.servo
     simulator.command({"pan_left": 0.3})
     simulator.advance(servo.command_latency_s * 0.9)
@@ -144,13 +145,13 @@ def test_only_one_target_is_shown(blind):
     blind.place_target("cube", (0.5, 0.05, 0.0))
     blind.place_target("marker", (0.5, -0.05, 0.0))
     assert [box.name for box in blind.true_boxes("left")] == ["marker"]
-    blind.set_parameters(blind.parameters.replaced(target="cube"))
+    blind.set_parameters(blind.parameters.replaced({"target.object": "cube"}))
     blind.place_target("cube", (0.5, 0.0, 0.0))
     assert [box.name for box in blind.true_boxes("left")] == ["cube"]
 
 
 def test_a_turning_rig_leaves_its_target_behind():
-    simulator = Simulator(SimParameters.ideal().replaced(rig_yaw_rate_rad_s=0.5), render=False)
+    simulator = Simulator(SimParameters.ideal({"rig_yaw_rate_rad_s": 0.5}), render=False)
     simulator.place_target("cube", (1.0, 0.0, 0.0))
     before = simulator.truth().version_error_rad
     simulator.advance(0.2)
@@ -158,7 +159,7 @@ def test_a_turning_rig_leaves_its_target_behind():
 
 
 def test_a_sinusoid_moves_the_target_about_its_place():
-    moving = SimParameters.ideal().replaced(motion="sinusoid", motion_y_m=0.1, motion_frequency_hz=0.25)
+    moving = SimParameters.ideal({"motion.kind": "sinusoid", "motion.y_m": 0.1, "motion.frequency_hz": 0.25})
     simulator = Simulator(moving, render=False)
     simulator.place_target("cube", (1.0, 0.0, 0.0))
     simulator.advance(1.0)
@@ -181,7 +182,7 @@ def test_a_view_shows_the_cube_where_the_truth_says(seeing):
 
 def test_the_same_seed_gives_the_same_pictures_and_another_does_not(seeing):
     def picture(seed):
-        simulator = Simulator(SimParameters(seed=seed))
+        simulator = Simulator(SimParameters.of({"seed": seed}))
         frame = simulator.capture()
         simulator.close()
         return frame
@@ -193,7 +194,7 @@ def test_the_same_seed_gives_the_same_pictures_and_another_does_not(seeing):
 
 
 def test_another_world_seed_is_another_room(seeing):
-    other = Simulator(SimParameters.ideal(world_seed=1))
+    other = Simulator(SimParameters.ideal({"world.seed": 1}))
     seeing.set_head({"pan_left": 0.0, "pan_right": 0.0, "tilt": 0.0})
     difference = np.abs(other.view("left").astype(int) - seeing.view("left").astype(int)).mean()
     other.close()
@@ -202,7 +203,7 @@ def test_another_world_seed_is_another_room(seeing):
 
 def test_imperfections_do_what_they_say(seeing):
     """Roll and pitch of the right mount move its picture as a rotation of the camera does."""
-    pitched = Simulator(SimParameters.ideal().replaced(preset="realistic", right_pitch_rad=0.0093))
+    pitched = Simulator(SimParameters.ideal().replaced({"preset": "realistic", "right_camera.pitch_rad": 0.0093}))
     for simulator in (pitched, seeing):
         simulator.set_head({"pan_left": 0.0, "pan_right": 0.0, "tilt": 0.0})
         simulator.place_target("cube", (0.8, 0.0, 0.0))
@@ -225,18 +226,21 @@ def test_pictures_need_a_renderer(blind):
 
 
 def test_the_ideal_preset_overrides_every_imperfection():
-    preset = SimParameters(preset="ideal").effective()
-    named = {field.name: getattr(preset, field.name) for field in dataclasses.fields(preset)}
-    for name in ("noise_sigma", "right_clock_offset_s", "frame_jitter_s", "right_roll_rad", "right_pitch_rad"):
-        assert named[name] == 0
-    assert preset.servo == "ideal"
+    preset = SimParameters.of({"preset": "ideal"}).effective()
+    imperfections = ("camera.noise_sigma", "right_camera.clock_offset_s", "camera.frame_jitter_s")
+    mounts = ("right_camera.roll_rad", "right_camera.pitch_rad")
+    for name in (*imperfections, *mounts):
+        assert operator.attrgetter(name)(preset) == 0
+    assert preset.simulation.servo == "ideal"
     realistic = SimParameters()
-    for name in (
-        "noise_sigma",
-        "right_clock_offset_s",
-        "frame_jitter_s",
-        "right_roll_rad",
-        "latency_s",
-        "jpeg_quality",
-    ):
-        assert getattr(realistic, name) != 0
+    for name in (*imperfections, *mounts, "camera.latency_s", "camera.jpeg_quality"):
+        assert operator.attrgetter(name)(realistic) != 0
+
+
+def test_parameters_are_replaced_by_their_full_names():
+    changed = SimParameters.of({"seed": 3, "world.seed": 4})
+    assert (changed.simulation.seed, changed.world.seed) == (3, 4)
+    with pytest.raises(ParameterError, match="world_seed"):
+        SimParameters.of({"world_seed": 4})
+    with pytest.raises(ParameterError, match=r"'motion\.stations_m'"):
+        SimParameters.of({"motion.stations_m": (1.0,)})

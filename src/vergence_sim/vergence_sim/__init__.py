@@ -1,4 +1,4 @@
-"""A binocular head in a furnished room, on MuJoCo: stands in for cameras, servos and world."""
+"""A binocular head in a furnished room, on MuJoCo: simulates cameras, servos and world."""
 
 import ctypes
 import os
@@ -20,5 +20,5 @@ def _offscreen_backend() -> str:
 os.environ.setdefault("MUJOCO_GL", _offscreen_backend())
 # One rasteriser thread leaves the cores to the other nodes.
 os.environ.setdefault("LP_NUM_THREADS", "1")
-# Mesa's software rasteriser spends a third of a frame on blending between mipmaps, which nobody sees.
+# Mesa's software rasteriser spends a third of a frame on blending between mipmaps, which changes no image visibly.
 os.environ.setdefault("LP_PERF", "no_mip_linear")

@@ -9,20 +9,21 @@ from vergence_sim.parameters import SimParameters
 
 
 class CommandError(ValueError):
-    """A joint command that cannot be: nothing moves."""
+    """A joint command that is refused as a whole: nothing moves."""
 
 
 class Head:
     """Three servo plants by joint name; a command is limited to the rig's joint limits."""
 
     def __init__(self, rig: Rig, parameters: SimParameters) -> None:
-        rig = rig if parameters.servo == "rig" else rig.with_servos(PRESETS[parameters.servo])
-        if parameters.servo_latency_s >= 0:
-            late = [
-                replace(joint, servo=joint.servo.replaced(command_latency_s=parameters.servo_latency_s))
+        simulation = parameters.simulation
+        rig = rig if simulation.servo == "rig" else rig.with_servos(PRESETS[simulation.servo])
+        if simulation.servo_latency_s >= 0:
+            joints = [
+                replace(joint, servo=joint.servo.replaced(command_latency_s=simulation.servo_latency_s))
                 for _, joint in rig.joints.items()
             ]
-            rig = replace(rig, joints=Joints(*late))
+            rig = replace(rig, joints=Joints(*joints))
         self.rig = rig
         self._plants = {name: ServoPlant(joint.servo, 0.0) for name, joint in self.rig.joints.items()}
 
@@ -30,33 +31,33 @@ class Head:
         """Command joints by name [rad]; raises CommandError for an unknown name or an angle that is not finite."""
         for name, angle in angles_rad.items():
             if name not in self._plants:
-                raise CommandError(f"joint is {name!r}: allowed is one of {', '.join(JOINT_NAMES)}")
+                raise CommandError(f"joint must be one of {', '.join(JOINT_NAMES)}: got {name!r}")
             if not abs(angle) < 1e9:
-                raise CommandError(f"{name} is {angle!r}: allowed is a finite angle [rad]")
+                raise CommandError(f"command of joint {name} must be a finite angle [rad]: got {angle!r}")
         for name, angle in angles_rad.items():
             self._plants[name].command(self.rig.joints[name].clamp(angle), now_s)
 
     def step(self, now_s: float) -> None:
-        """Move on to `now_s`."""
+        """Advance every servo to `now_s`."""
         for plant in self._plants.values():
             plant.step(now_s)
 
     def place(self, angles_rad: Mapping[str, float], now_s: float) -> None:
-        """Put the joints somewhere at once, past the servos."""
+        """Set the joints' angles [rad] at once, without their servos."""
         for name, angle in angles_rad.items():
             self._plants[name] = ServoPlant(self.rig.joints[name].servo, angle, now_s)
 
     @property
     def true_rad(self) -> dict[str, float]:
-        """Where the shafts are."""
+        """True angles of the shafts."""
         return {name: plant.true_rad for name, plant in self._plants.items()}
 
     @property
     def velocity_rad_s(self) -> dict[str, float]:
-        """How fast the servos turn."""
+        """True speeds of the shafts."""
         return {name: plant.velocity_rad_s for name, plant in self._plants.items()}
 
     @property
     def modelled_rad(self) -> dict[str, float]:
-        """Where a driver without feedback believes them."""
+        """Angles that a driver without position feedback reports."""
         return {name: plant.modelled_rad for name, plant in self._plants.items()}

@@ -10,11 +10,11 @@ from vergence_sim.surfaces import Image
 FACES = ("right", "left", "up", "down", "front", "back")
 """Of MuJoCo's cube textures, in the order of `ModelBuilder.wrap`: what looks along +x, -x, +y, -y, +z, -z."""
 
-# Seen from outside with z up, MuJoCo puts the pictures of the first three on their sides or upside down.
+# Seen from outside with z up, MuJoCo shows the images of the first three on their sides or upside down.
 _UPRIGHT = {"right": cv2.ROTATE_90_COUNTERCLOCKWISE, "left": cv2.ROTATE_90_CLOCKWISE, "up": cv2.ROTATE_180}
 _VISIBLE = 0
 HIDDEN_GROUP = 3
-"""Geometry of this group is seen by nobody but an onlooker: the head itself."""
+"""Group of the head's own parts: not rendered in the eyes' images, only in a viewer."""
 
 
 class ModelBuilder:
@@ -68,11 +68,11 @@ class ModelBuilder:
         )
 
     def add(self, *elements: str) -> None:
-        """Put shapes or bodies into the world."""
+        """Add shapes or bodies to the world."""
         self._bodies += elements
 
     def movable(self, name: str, *shapes: str, place_m: tuple[float, float, float] = (0.0, 0.0, -5.0)) -> None:
-        """Put a body into the world that goes where it is put; it starts below the floor unless told."""
+        """Add a body whose place is set from outside; it starts below the floor unless `place_m` is given."""
         self._bodies.append(f'<body name="{name}" mocap="true" pos="{_text(place_m)}">{"".join(shapes)}</body>')
 
     def compiled(self, size_px: tuple[int, int], samples: int, headlight: str, lights: str) -> mujoco.MjModel:

@@ -1,4 +1,4 @@
-"""What a cheap webcam does to a rendered view: motion blur, lens distortion, exposure, white balance, noise, JPEG."""
+"""A cheap webcam's imperfections: motion blur, lens distortion, exposure, white balance, noise, JPEG."""
 
 import math
 from typing import Any
@@ -8,24 +8,24 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.rig import CameraSpec
-from vergence_sim.parameters import SimParameters
+from vergence_sim.parameters import RightCameraParameters, SimParameters
 
 Image = npt.NDArray[np.uint8]
 
 _NOISE_BANK = 8
 
 
-_LEAST_SMEAR_PX = 2.0
+_LEAST_BLUR_PX = 2.0
 
 
-def smeared(view: Image, motion_px: tuple[float, float]) -> Image:
+def motion_blurred(view: Image, motion_px: tuple[float, float]) -> Image:
     """Return a view (h, w, 3) that moved by `motion_px` (x, y) while it was exposed.
 
-    The whole view moves alike, as it does when the eye turns: a target that the eye follows is not held sharp. Less
-    than two pixels are left alone.
+    The whole view moves alike, as it does when the eye turns, so that a pursued target is blurred too. Motions of less
+    than two pixels change nothing.
     """
     width, height = (round(abs(value)) for value in motion_px)
-    if max(width, height) < _LEAST_SMEAR_PX:
+    if max(width, height) < _LEAST_BLUR_PX:
         return view
     return np.asarray(cv2.blur(view, (max(width, 1), max(height, 1)), borderType=cv2.BORDER_REPLICATE), np.uint8)
 
@@ -33,7 +33,7 @@ def smeared(view: Image, motion_px: tuple[float, float]) -> Image:
 class Lens:
     """Maps a rendered pinhole view, a little wider than the camera's, to the distorted image.
 
-    `render_focal_px` is the focal length to render with, so that no corner of the image is left without a view.
+    `render_focal_px` is the focal length to render with, small enough that the view covers the corners of the image.
     """
 
     def __init__(self, camera: CameraSpec, distortion: tuple[float, ...]) -> None:
@@ -62,14 +62,14 @@ class Lens:
         return np.asarray(cv2.remap(view, self._maps[0], self._maps[1], cv2.INTER_LINEAR), np.uint8)
 
     def distorted(self, pixel: tuple[float, float]) -> tuple[float, float]:
-        """Return where the lens puts what an ideal one would put at `pixel` (x, y) [px]; NaN stays NaN."""
+        """Return the distorted pixel (x, y) of an undistorted one; NaN stays NaN."""
         if math.isnan(pixel[0]):
             return pixel
         ((x, y),) = self.distorted_points(np.array([pixel])).tolist()
         return x, y
 
     def distorted_points(self, points_px: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Return where the lens puts what an ideal one would put at (N, 2) finite pixels."""
+        """Return the distorted pixels (N, 2) of finite undistorted ones (N, 2)."""
         if not self._distortion.any():
             return points_px
         camera = self.camera
@@ -93,19 +93,19 @@ class Sensor:
         self._gains = (-1.0, -1.0, -1.0)
 
     def apply(self, image: Image, parameters: SimParameters) -> Image:
-        """Return what the sensor makes of an image (h, w, 3) BGR."""
+        """Return the sensor's output for an image (h, w, 3) BGR."""
         if self._right:
-            image = self._exposed(image, parameters)
-        if parameters.noise_sigma > 0:
-            image = self._noisy(image, parameters.noise_sigma)
-        if parameters.jpeg_quality > 0:
-            _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, parameters.jpeg_quality])
+            image = self._exposed(image, parameters.right_camera)
+        camera = parameters.camera
+        if camera.noise_sigma > 0:
+            image = self._noisy(image, camera.noise_sigma)
+        if camera.jpeg_quality > 0:
+            _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, camera.jpeg_quality])
             image = np.asarray(cv2.imdecode(jpeg, cv2.IMREAD_COLOR), np.uint8)
         return image
 
-    def _exposed(self, image: Image, parameters: SimParameters) -> Image:
-        gain = parameters.right_gain
-        gains = (gain * parameters.right_blue_gain, gain, gain * parameters.right_red_gain)
+    def _exposed(self, image: Image, camera: RightCameraParameters) -> Image:
+        gains = (camera.gain * camera.blue_gain, camera.gain, camera.gain * camera.red_gain)
         if gains == (1.0, 1.0, 1.0):
             return image
         if gains != self._gains:
@@ -117,12 +117,12 @@ class Sensor:
     def _noisy(self, image: Image, sigma: float) -> Image:
         if sigma != self._noise_sigma:
             levels = np.clip(np.rint(self._bank * sigma), -255, 255)
-            # What brightens and what darkens apart, as bytes, each field twice over: rolled by a slice, added at once.
+            # Positive and negative parts as bytes, each field tiled twice: a shift is a slice, an addition one call.
             brighter, darker = np.maximum(levels, 0), np.maximum(-levels, 0)
             self._noise = _twice(brighter), _twice(darker)
             self._noise_sigma = sigma
         assert self._noise is not None
-        # A whole new field for every frame would cost more than the rendering: a drawn one, rolled by a drawn shift.
+        # A new field for every frame would cost more than rendering: take a random one at a random shift.
         field = int(self._rng.integers(_NOISE_BANK))
         row = int(self._rng.integers(image.shape[0]))
         brighter, darker = (part[field, row : row + image.shape[0]] for part in self._noise)

@@ -1,164 +1,402 @@
-"""The simulator's parameters: imperfections of cameras and servos, the world, the target."""
+"""The simulator's parameters, in groups: the simulation, the world, the cameras' imperfections, the target's motion."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
 
-from vergence_rig.parameters import Groups, ParameterError, Parameters, parameter
+from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError, parameter
 
 TARGETS = ("cube", "marker")
 DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
 MOTIONS = ("static", "step", "ramp", "sinusoid", "stations")
 _MOST_EXTRA_CUBES, _MOST_LOOK_ALIKES = 3, 6
+_LARGEST_SEED = 2**31 - 1
 
 
 @dataclass(frozen=True)
-class SimParameters(Parameters):
-    """What can be set about the simulation. Defaults equal config/sim_node.yaml: realistic, and not zero."""
+class SimulationParameters(Parameters):
+    """The simulated head as a whole."""
 
     rig: str = parameter("", "path of rig.yaml; empty for the built-in rig", read_only=True)
     preset: str = parameter(
         "realistic",
-        "realistic: as the values below say; ideal: ideal servos and cameras, whatever they say",
+        "imperfections of servos and cameras: as the other parameters say (realistic), or none at all (ideal)",
         choices=("realistic", "ideal"),
         read_only=True,
     )
     servo: str = parameter(
         "rig",
-        "which servos turn the head; rig: those of rig.yaml",
+        "servos that turn the head: those of rig.yaml (rig), or all of one kind",
         choices=("rig", "sg90", "mg995", "ideal"),
         read_only=True,
     )
     servo_latency_s: float = parameter(
-        -1.0, "command to first motion; negative for the servo's own", unit="s", minimum=-1, maximum=1, read_only=True
+        -1.0,
+        "time from a joint command to the servo's first motion; negative for the servo's own",
+        unit="s",
+        minimum=-1,
+        maximum=1,
+        read_only=True,
     )
-    seed: int = parameter(0, "of noise and jitter", minimum=0, maximum=2**31 - 1, read_only=True)
-    world_seed: int = parameter(
-        0, "of the room: textures, furniture, the cube's colours", minimum=0, maximum=2**31 - 1, read_only=True
+    seed: int = parameter(
+        0, "seed of sensor noise and of exposure jitter", minimum=0, maximum=_LARGEST_SEED, read_only=True
     )
-    light: float = parameter(1.0, "brightness of the room", minimum=0.05, maximum=3.0, read_only=True)
+    joint_rate_hz: float = parameter(
+        50.0, "rate at which joint_states is published", unit="Hz", minimum=1, maximum=1000, read_only=True
+    )
+    rig_yaw_rate_rad_s: float = parameter(
+        0.0,
+        "speed at which the whole rig turns about the vertical, positive to the left",
+        unit="rad/s",
+        minimum=-5,
+        maximum=5,
+    )
+
+
+@dataclass(frozen=True)
+class WorldParameters(Parameters):
+    """The room and what stands in it."""
+
+    seed: int = parameter(
+        0,
+        "seed of the room: textures, furniture, the cube's colours",
+        minimum=0,
+        maximum=_LARGEST_SEED,
+        read_only=True,
+        formerly="world_seed",
+    )
+    light: float = parameter(
+        1.0, "brightness of the room, 1 for normal", minimum=0.05, maximum=3.0, read_only=True, formerly="light"
+    )
     extra_cubes: int = parameter(
         0,
-        "further Rubik's cubes in the room, other than the target",
+        "number of further Rubik's cubes in the room, other than the target",
         minimum=0,
         maximum=_MOST_EXTRA_CUBES,
         read_only=True,
+        formerly="extra_cubes",
     )
     look_alikes: int = parameter(
         0,
-        "things in the room that are coloured or chequered like a Rubik's cube",
+        "number of objects in the room that have a Rubik's cube's colours or pattern",
         minimum=0,
         maximum=_MOST_LOOK_ALIKES,
         read_only=True,
+        formerly="look_alikes",
     )
     distractor: str = parameter(
         "four",
-        "what is put at sim/distractor_pose, 6 cm wide, in the cube's colours: a puzzle of so many cells a side, a "
-        "die, a plain or a striped block",
+        "object that stands at sim/distractor_pose, 6 cm wide, in the cube's colours: a puzzle of 2, 4 or 5 cells a "
+        "side, a die, a plain or a striped block",
         choices=DISTRACTORS,
         read_only=True,
+        formerly="distractor",
     )
-    samples: int = parameter(0, "samples a pixel when rendering", minimum=0, maximum=16, read_only=True)
 
-    frame_rate_hz: float = parameter(30.0, "of each camera", unit="Hz", minimum=1, maximum=120, read_only=True)
-    right_clock_offset_s: float = parameter(
-        0.007,
-        "the right camera exposes this much after the left one",
-        unit="s",
-        minimum=-0.5,
-        maximum=0.5,
-        read_only=True,
-    )
-    right_clock_drift: float = parameter(
-        2e-5, "by how much the right camera's period is longer", minimum=-0.01, maximum=0.01, read_only=True
+
+@dataclass(frozen=True)
+class CameraParameters(Parameters):
+    """What both cameras have in common."""
+
+    frame_rate_hz: float = parameter(
+        30.0, "frame rate of each camera", unit="Hz", minimum=1, maximum=120, read_only=True, formerly="frame_rate_hz"
     )
     frame_jitter_s: float = parameter(
-        0.0005, "deviation of exposures from an even beat", unit="s", minimum=0, maximum=0.01
+        0.0005,
+        "standard deviation of an exposure's time from an even beat",
+        unit="s",
+        minimum=0,
+        maximum=0.01,
+        formerly="frame_jitter_s",
     )
-    latency_s: float = parameter(0.045, "exposure to publication", unit="s", minimum=0, maximum=1)
+    latency_s: float = parameter(
+        0.045, "time from an exposure to its publication", unit="s", minimum=0, maximum=1, formerly="latency_s"
+    )
     exposure_s: float = parameter(
-        0.004, "time of exposure: a turning eye's picture smears; 0 for none", unit="s", minimum=0, maximum=0.1
+        0.004,
+        "exposure time, during which the picture of a turning eye is blurred; 0 for no blur",
+        unit="s",
+        minimum=0,
+        maximum=0.1,
+        formerly="exposure_s",
     )
-    noise_sigma: float = parameter(2.5, "sensor noise in grey levels", minimum=0, maximum=50)
-    right_gain: float = parameter(1.08, "exposure of the right camera over the left one's", minimum=0.1, maximum=4)
-    right_blue_gain: float = parameter(0.95, "white balance: blue of the right over the left", minimum=0.1, maximum=4)
-    right_red_gain: float = parameter(1.04, "white balance: red of the right over the left", minimum=0.1, maximum=4)
-    jpeg_quality: int = parameter(90, "images pass through JPEG of this quality; 0 for none", minimum=0, maximum=100)
+    noise_sigma: float = parameter(
+        2.5,
+        "standard deviation of the sensor noise",
+        unit="grey levels",
+        minimum=0,
+        maximum=50,
+        formerly="noise_sigma",
+    )
+    jpeg_quality: int = parameter(
+        90,
+        "quality of the JPEG that every image is compressed to and decoded from; 0 for no JPEG",
+        minimum=0,
+        maximum=100,
+        formerly="jpeg_quality",
+    )
+    distortion: tuple[float, ...] = parameter(
+        (-0.04, 0.02, 0.0, 0.0, 0.0),
+        "distortion coefficients k1 k2 p1 p2 k3 of both lenses",
+        minimum=-1,
+        maximum=1,
+        read_only=True,
+        formerly="distortion",
+    )
+    samples_per_pixel: int = parameter(
+        0,
+        "samples of the renderer's antialiasing; 0 for none",
+        minimum=0,
+        maximum=16,
+        read_only=True,
+        formerly="samples",
+    )
 
-    left_roll_rad: float = parameter(
-        -0.003, "the left camera is mounted rolled by", unit="rad", minimum=-0.2, maximum=0.2, read_only=True
-    )
-    right_roll_rad: float = parameter(
-        0.006, "the right camera is mounted rolled by", unit="rad", minimum=-0.2, maximum=0.2, read_only=True
-    )
-    right_pitch_rad: float = parameter(
-        0.0093,
-        "the right camera is mounted pitched by (about 5 px)",
+
+@dataclass(frozen=True)
+class LeftCameraParameters(Parameters):
+    """How the left camera is mounted."""
+
+    roll_rad: float = parameter(
+        -0.003,
+        "roll of the left camera in its mount",
         unit="rad",
         minimum=-0.2,
         maximum=0.2,
         read_only=True,
-    )
-    distortion: tuple[float, ...] = parameter(
-        (-0.04, 0.02, 0.0, 0.0, 0.0), "k1 k2 p1 p2 k3 of both lenses", minimum=-1, maximum=1, read_only=True
+        formerly="left_roll_rad",
     )
 
-    target: str = parameter("cube", "which object is the target", choices=TARGETS)
-    start_x_m: float = parameter(
-        0.8, "the target's place at the start, rig_base", unit="m", minimum=-100, maximum=100, read_only=True
+
+@dataclass(frozen=True)
+class RightCameraParameters(Parameters):
+    """How the right camera differs from the left one, and how it is mounted."""
+
+    clock_offset_s: float = parameter(
+        0.007,
+        "time by which the right camera exposes after the left one",
+        unit="s",
+        minimum=-0.5,
+        maximum=0.5,
+        read_only=True,
+        formerly="right_clock_offset_s",
     )
-    start_y_m: float = parameter(0.0, "", unit="m", minimum=-100, maximum=100, read_only=True)
-    start_z_m: float = parameter(0.0, "", unit="m", minimum=-100, maximum=100, read_only=True)
-    target_yaw_rad: float = parameter(
-        0.0, "the target is turned about the vertical by", unit="rad", minimum=-3.2, maximum=3.2
+    clock_drift: float = parameter(
+        2e-5,
+        "share by which the right camera's period is longer than the left one's",
+        minimum=-0.01,
+        maximum=0.01,
+        read_only=True,
+        formerly="right_clock_drift",
     )
-    motion: str = parameter("static", "how the target moves about its place", choices=MOTIONS)
-    motion_x_m: float = parameter(
-        0.0, "amplitude, step or (ramp) speed a second along x", unit="m", minimum=-10, maximum=10
+    gain: float = parameter(
+        1.08,
+        "exposure of the right camera, as a multiple of the left one's",
+        minimum=0.1,
+        maximum=4,
+        formerly="right_gain",
     )
-    motion_y_m: float = parameter(0.0, "the same along y", unit="m", minimum=-10, maximum=10)
-    motion_z_m: float = parameter(0.0, "the same along z", unit="m", minimum=-10, maximum=10)
-    motion_frequency_hz: float = parameter(0.2, "of the sinusoid", unit="Hz", minimum=0.001, maximum=10)
-    stations_m: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0),
-        "of motion stations: x y z from its place, of one station after another",
+    blue_gain: float = parameter(
+        0.95,
+        "white balance: blue channel of the right camera, as a multiple of the left one's",
+        minimum=0.1,
+        maximum=4,
+        formerly="right_blue_gain",
+    )
+    red_gain: float = parameter(
+        1.04,
+        "white balance: red channel of the right camera, as a multiple of the left one's",
+        minimum=0.1,
+        maximum=4,
+        formerly="right_red_gain",
+    )
+    roll_rad: float = parameter(
+        0.006,
+        "roll of the right camera in its mount",
+        unit="rad",
+        minimum=-0.2,
+        maximum=0.2,
+        read_only=True,
+        formerly="right_roll_rad",
+    )
+    pitch_rad: float = parameter(
+        0.0093,
+        "pitch of the right camera in its mount (the default shifts its image by about 5 px)",
+        unit="rad",
+        minimum=-0.2,
+        maximum=0.2,
+        read_only=True,
+        formerly="right_pitch_rad",
+    )
+
+
+@dataclass(frozen=True)
+class TargetParameters(Parameters):
+    """Which object is the target and where it starts."""
+
+    object: str = parameter("cube", "object that is the target", choices=TARGETS, formerly="target")
+    x_m: float = parameter(
+        0.8,
+        "x of the target's centre at the start, in rig_base",
+        unit="m",
+        minimum=-100,
+        maximum=100,
+        read_only=True,
+        formerly="start_x_m",
+    )
+    y_m: float = parameter(
+        0.0,
+        "y of the target's centre at the start, in rig_base",
+        unit="m",
+        minimum=-100,
+        maximum=100,
+        read_only=True,
+        formerly="start_y_m",
+    )
+    z_m: float = parameter(
+        0.0,
+        "z of the target's centre at the start, in rig_base",
+        unit="m",
+        minimum=-100,
+        maximum=100,
+        read_only=True,
+        formerly="start_z_m",
+    )
+    yaw_rad: float = parameter(
+        0.0,
+        "angle by which the target is turned about the vertical",
+        unit="rad",
+        minimum=-3.2,
+        maximum=3.2,
+        formerly="target_yaw_rad",
+    )
+
+
+@dataclass(frozen=True)
+class MotionParameters(Parameters):
+    """How the target moves about its place; a change starts the motion anew."""
+
+    kind: str = parameter("static", "motion of the target about its place", choices=MOTIONS, formerly="motion")
+    x_m: float = parameter(
+        0.0,
+        "extent of the target's motion along x: amplitude of a sinusoid, size of a step, way per second of a ramp",
         unit="m",
         minimum=-10,
         maximum=10,
+        formerly="motion_x_m",
     )
-    station_s: float = parameter(2.0, "of motion stations: time at each", unit="s", minimum=0.01, maximum=3600)
-    rig_yaw_rate_rad_s: float = parameter(0.0, "the whole rig turns", unit="rad/s", minimum=-5, maximum=5)
-
-    joint_rate_hz: float = parameter(50.0, "of joint_states", unit="Hz", minimum=1, maximum=1000, read_only=True)
+    y_m: float = parameter(
+        0.0,
+        "extent of the target's motion along y: amplitude of a sinusoid, size of a step, way per second of a ramp",
+        unit="m",
+        minimum=-10,
+        maximum=10,
+        formerly="motion_y_m",
+    )
+    z_m: float = parameter(
+        0.0,
+        "extent of the target's motion along z: amplitude of a sinusoid, size of a step, way per second of a ramp",
+        unit="m",
+        minimum=-10,
+        maximum=10,
+        formerly="motion_z_m",
+    )
+    frequency_hz: float = parameter(
+        0.2,
+        "frequency of the sinusoid",
+        unit="Hz",
+        minimum=0.001,
+        maximum=10,
+        formerly="motion_frequency_hz",
+    )
+    stations_m: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0),
+        "offsets x y z of one station after another from the target's place, for the motion stations",
+        unit="m",
+        minimum=-10,
+        maximum=10,
+        formerly="stations_m",
+    )
+    station_s: float = parameter(
+        2.0,
+        "time that the target stays at each station, for the motion stations",
+        unit="s",
+        minimum=0.01,
+        maximum=3600,
+        formerly="station_s",
+    )
 
     def check(self) -> None:
         """Hold the stations to whole triples."""
         if len(self.stations_m) % 3 or not self.stations_m:
             raise ParameterError("stations_m", self.stations_m, "three numbers, x y z, for every station")
 
+
+GROUPS: Groups = (
+    ("", SimulationParameters),
+    ("world.", WorldParameters),
+    ("camera.", CameraParameters),
+    ("left_camera.", LeftCameraParameters),
+    ("right_camera.", RightCameraParameters),
+    ("target.", TargetParameters),
+    ("motion.", MotionParameters),
+)
+
+_IDEAL: Mapping[str, Any] = {
+    "servo": "ideal",
+    "camera.frame_jitter_s": 0.0,
+    "camera.exposure_s": 0.0,
+    "camera.noise_sigma": 0.0,
+    "camera.jpeg_quality": 0,
+    "camera.distortion": (0.0, 0.0, 0.0, 0.0, 0.0),
+    "left_camera.roll_rad": 0.0,
+    "right_camera.clock_offset_s": 0.0,
+    "right_camera.clock_drift": 0.0,
+    "right_camera.gain": 1.0,
+    "right_camera.blue_gain": 1.0,
+    "right_camera.red_gain": 1.0,
+    "right_camera.roll_rad": 0.0,
+    "right_camera.pitch_rad": 0.0,
+}
+
+
+@dataclass(frozen=True)
+class SimParameters:
+    """Every parameter group of the simulator, in the order of GROUPS. The defaults equal config/sim_node.yaml."""
+
+    simulation: SimulationParameters = SimulationParameters()
+    world: WorldParameters = WorldParameters()
+    camera: CameraParameters = CameraParameters()
+    left_camera: LeftCameraParameters = LeftCameraParameters()
+    right_camera: RightCameraParameters = RightCameraParameters()
+    target: TargetParameters = TargetParameters()
+    motion: MotionParameters = MotionParameters()
+
     @classmethod
-    def ideal(cls, **changes: object) -> "SimParameters":
-        """Return the set without any imperfection."""
-        return cls(preset="ideal", **changes).effective()  # type: ignore[arg-type]
+    def of(cls, values: Mapping[str, Any]) -> "SimParameters":
+        """Return the defaults with some values changed, by their full names such as "world.seed"."""
+        return cls().replaced(values)
+
+    @classmethod
+    def ideal(cls, values: Mapping[str, Any] | None = None) -> "SimParameters":
+        """Return the set without any imperfection, some other values changed by their full names."""
+        return cls.of({"preset": "ideal", **(values or {})}).effective()
+
+    def replaced(self, values: Mapping[str, Any]) -> "SimParameters":
+        """Return a validated copy with some values changed by their full names; raises ParameterError."""
+        known = {prefix + spec.name for prefix, group in GROUPS for spec in group.specs()}
+        for name, value in values.items():
+            if name not in known:
+                raise UnknownParameterError(name, value, known)
+        groups = []
+        for (prefix, kind), field in zip(GROUPS, fields(self), strict=True):
+            own = {spec.name: values[prefix + spec.name] for spec in kind.specs() if prefix + spec.name in values}
+            try:
+                groups.append(getattr(self, field.name).replaced(**own))
+            except ParameterError as error:
+                raise ParameterError(prefix + error.name, error.value, error.allowed) from None
+        return SimParameters(*groups)
 
     def effective(self) -> "SimParameters":
         """Return the set with the preset applied."""
-        if self.preset != "ideal":
-            return self
-        return self.replaced(
-            servo="ideal",
-            right_clock_offset_s=0.0,
-            right_clock_drift=0.0,
-            frame_jitter_s=0.0,
-            exposure_s=0.0,
-            noise_sigma=0.0,
-            right_gain=1.0,
-            right_blue_gain=1.0,
-            right_red_gain=1.0,
-            jpeg_quality=0,
-            left_roll_rad=0.0,
-            right_roll_rad=0.0,
-            right_pitch_rad=0.0,
-            distortion=(0.0, 0.0, 0.0, 0.0, 0.0),
-        )
-
-
-GROUPS: Groups = (("", SimParameters),)
+        return self.replaced(_IDEAL) if self.simulation.preset == "ideal" else self

@@ -1,4 +1,4 @@
-"""When each eye exposes and when its picture goes out: free-running clocks, jitter, latency. No ROS, no sleeping."""
+"""When each eye exposes and when its image is published: free-running clocks, jitter, latency. It never sleeps."""
 
 import heapq
 import itertools
@@ -20,26 +20,26 @@ class Event:
     payload: object = field(compare=False, default=None)
 
 
-_JOINTS_GIVEN_UP_S = 1.0
+_LATEST_JOINTS_S = 1.0
 
 
 class Schedule:
-    """The next thing to do, in order of time. An exposure that is a whole period late is dropped and counted.
+    """Events in order of time. An exposure that is a whole period late is dropped and counted.
 
-    Joint states are told for every beat, however late: they cost nothing, and between sparse ones nobody could tell
-    where the eyes were when a picture was exposed.
+    Joint states are published for every period, however late: they cost nothing, and the angles at an image's stamp
+    are interpolated between them.
     """
 
     def __init__(self, parameters: SimParameters, start_s: float) -> None:
-        self._rng = np.random.default_rng(np.random.SeedSequence(parameters.seed).spawn(3)[2])
+        self._rng = np.random.default_rng(np.random.SeedSequence(parameters.simulation.seed).spawn(3)[2])
         self._count = itertools.count()
         self._events: list[Event] = []
-        period_s = 1.0 / parameters.frame_rate_hz
-        self._periods_s = {"left": period_s, "right": period_s * (1.0 + parameters.right_clock_drift)}
-        self._beats_s = {"left": start_s, "right": start_s + parameters.right_clock_offset_s % period_s}
-        self._joint_period_s = 1.0 / parameters.joint_rate_hz
+        period_s, right = 1.0 / parameters.camera.frame_rate_hz, parameters.right_camera
+        self._periods_s = {"left": period_s, "right": period_s * (1.0 + right.clock_drift)}
+        self._beats_s = {"left": start_s, "right": start_s + right.clock_offset_s % period_s}
+        self._joint_period_s = 1.0 / parameters.simulation.joint_rate_hz
         self.dropped = 0
-        self._jitter_s = parameters.frame_jitter_s
+        self._jitter_s = parameters.camera.frame_jitter_s
         for eye in self._beats_s:
             self._expose(eye)
         self._push(start_s, "joints")
@@ -49,7 +49,7 @@ class Schedule:
         return self._events[0].due_s
 
     def pop(self, now_s: float) -> Event:
-        """Take the next event and arrange for its successor; `now_s` tells how late it is."""
+        """Remove and return the next event, and schedule its successor; `now_s` says how late it is."""
         event = heapq.heappop(self._events)
         if event.kind == "expose":
             while self._beats_s[event.eye] < now_s - self._periods_s[event.eye]:
@@ -57,11 +57,11 @@ class Schedule:
                 self._beats_s[event.eye] += self._periods_s[event.eye]
             self._expose(event.eye)
         elif event.kind == "joints":
-            self._push(max(event.due_s + self._joint_period_s, now_s - _JOINTS_GIVEN_UP_S), "joints")
+            self._push(max(event.due_s + self._joint_period_s, now_s - _LATEST_JOINTS_S), "joints")
         return event
 
     def publish(self, eye: str, due_s: float, payload: object) -> None:
-        """Arrange for a picture to go out at `due_s`."""
+        """Schedule the publication of an image at `due_s`."""
         self._push(due_s, "publish", eye, payload)
 
     def set_jitter(self, jitter_s: float) -> None:
@@ -70,7 +70,7 @@ class Schedule:
 
     def _expose(self, eye: str) -> None:
         beat_s = self._beats_s[eye]
-        # Bounded at a tenth of the period, so that exposures of one eye never change places.
+        # Bounded at a tenth of the period, so that exposures of one eye stay in order.
         bound_s = 0.1 * self._periods_s[eye]
         jitter_s = float(np.clip(self._rng.normal(0.0, self._jitter_s), -bound_s, bound_s)) if self._jitter_s else 0.0
         self._push(beat_s + jitter_s, "expose", eye)

@@ -12,7 +12,7 @@ Image = npt.NDArray[np.uint8]
 
 
 class RenderError(RuntimeError):
-    """No way to render offscreen on this machine."""
+    """This machine cannot render offscreen."""
 
 
 class EyeRenderer:
@@ -56,7 +56,7 @@ class EyeRenderer:
         return np.asarray(cv2.cvtColor(cv2.flip(self._rgb, 0), cv2.COLOR_RGB2BGR), np.uint8)
 
     def close(self) -> None:
-        """Free what was allocated; twice is once."""
+        """Free the context and its buffers; idempotent."""
         if self._context is not None:
             self._context.make_current()
             self._mjr.free()

@@ -19,11 +19,11 @@ MARKER_LENGTH_M, MARKER_RADIUS_M = 0.14, 0.010
 EXTRA_CUBES = ("cube2", "cube3", "cube4")
 DISTRACTOR_SIDE_M = 0.06
 OBJECTS = (*TARGETS, "occluder", "distractor", *EXTRA_CUBES)
-"""What can be put somewhere; the extra cubes only where the room has them."""
+"""Movable objects; the extra cubes only where the room has them."""
 
 
 class SceneBuilder(ModelBuilder):
-    """A model with a room, targets and the head, each put in by its own method."""
+    """A model with a room, targets and the head, each added by its own method."""
 
     def __init__(self, rig: Rig, seed: int, samples: int, textured: bool = True) -> None:
         super().__init__(textured)
@@ -40,7 +40,7 @@ class SceneBuilder(ModelBuilder):
         self._room.furnish()
 
     def targets(self) -> None:
-        """The Rubik's cube, the marker pen, and an occluder: bodies that go where they are put."""
+        """Add the Rubik's cube, the marker pen and an occluder: movable bodies."""
         half = CUBE_SIDE_M / 2
         cube = self._wrapped("cube", cube_faces(np.random.default_rng([self._seed, 2])))
         self.movable("cube", self.shape("box", (0, 0, 0), (half, half, half), cube, name="cube"))
@@ -61,13 +61,13 @@ class SceneBuilder(ModelBuilder):
         )
 
     def distractor(self, kind: str) -> None:
-        """Put in a box of the cube's size and colours that is no Rubik's cube, of a kind of DISTRACTORS."""
+        """Add a box of the cube's size and colours that is no Rubik's cube, of a kind of DISTRACTORS."""
         side = DISTRACTOR_SIDE_M / 2
         alike = self._wrapped("distractor", look_alike_faces(np.random.default_rng([self._seed, 10]), kind=kind))
         self.movable("distractor", self.shape("box", (0, 0, 0), (side, side, side), alike, name="distractor"))
 
     def _barrel(self, radius: float, low: float, high: float) -> list[str]:
-        """Return a pen's barrel from short pieces: a cube map is only fair to a piece as high as it is wide."""
+        """Return a pen's barrel from short pieces: a cube map is undistorted only on a piece as high as wide."""
         pieces = max(1, round((high - low) / (2 * radius)))
         half = 0.5 * (high - low) / pieces
         shapes = []
@@ -82,7 +82,7 @@ class SceneBuilder(ModelBuilder):
         return shapes
 
     def crowd(self, extra_cubes: int, look_alikes: int) -> None:
-        """Put more Rubik's cubes on the table, and things that share their colours or their pattern."""
+        """Add more Rubik's cubes on the table, and objects that share their colours or their pattern."""
         half = CUBE_SIDE_M / 2
         places = self._room.free_table_places(extra_cubes + look_alikes)
         for number, name in enumerate(EXTRA_CUBES[:extra_cubes]):
@@ -100,7 +100,7 @@ class SceneBuilder(ModelBuilder):
     def head(self, fovy_rad: float, mounts: dict[str, tuple[float, float]]) -> None:
         """The paper's second hardware design: two pans on top of a tilt bar, a camera on each, on a turning base.
 
-        `mounts` gives each eye's roll and pitch in its mount [rad]. What the head itself is made of is for onlookers.
+        `mounts` gives each eye's roll and pitch in its mount [rad]. The head's own parts are in HIDDEN_GROUP.
         """
         half = self._rig.baseline_m / 2
         dark, blue, steel = (0.09, 0.09, 0.1), (0.1, 0.2, 0.5), (0.6, 0.62, 0.64)
@@ -111,7 +111,7 @@ class SceneBuilder(ModelBuilder):
             f'<body name="{eye}_camera" pos="0 {sign * half} 0">'
             f'<joint name="pan_{eye}" type="hinge" axis="0 0 1"/>'
             '<inertial pos="0 0 0" mass="0.05" diaginertia="1e-4 1e-4 1e-4"/>'
-            # Rolled about its axis and pitched: no mount is square.
+            # Roll and pitch of the mount.
             f'<body name="{eye}_lens" euler="{mounts[eye][0]} {mounts[eye][1]} 0">'
             '<inertial pos="0 0 0" mass="0.01" diaginertia="1e-5 1e-5 1e-5"/>'
             f'<camera name="{eye}" xyaxes="0 -1 0 0 0 1" fovy="{math.degrees(fovy_rad):.9f}"/>'
@@ -209,18 +209,19 @@ def _compiled(
 def build_scene(rig: Rig, parameters: SimParameters, fovy_rad: float, textured: bool = True) -> mujoco.MjModel:
     """Return the compiled room with head and targets; `fovy_rad` is the rendered views' vertical field of view.
 
-    The model is shared by all who ask for the same one: do not change it.
+    The model is cached and shared between equal parameters: do not change it.
     """
-    mounts = ((parameters.left_roll_rad, 0.0), (parameters.right_roll_rad, parameters.right_pitch_rad))
+    world, right = parameters.world, parameters.right_camera
+    mounts = ((parameters.left_camera.roll_rad, 0.0), (right.roll_rad, right.pitch_rad))
     return _compiled(
         rig,
-        parameters.world_seed,
-        parameters.samples,
-        parameters.light,
+        world.seed,
+        parameters.camera.samples_per_pixel,
+        world.light,
         fovy_rad,
         mounts,
-        parameters.extra_cubes,
-        parameters.look_alikes,
-        parameters.distractor,
+        world.extra_cubes,
+        world.look_alikes,
+        world.distractor,
         textured,
     )

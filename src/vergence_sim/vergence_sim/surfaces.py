@@ -1,7 +1,7 @@
 """Procedural surfaces: paint, brick, planks, cloth, card. Rich at every scale, never repeating, seeded.
 
 Every function returns (h, w, 3) uint8 BGR. `mean_gradient` states how much structure a surface has; a surface for a
-room has at least `LEAST_GRADIENT` and so gives a stereo matcher something to hold.
+room has at least `LEAST_GRADIENT`, enough texture for a stereo matcher.
 """
 
 import itertools

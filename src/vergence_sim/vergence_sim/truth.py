@@ -1,4 +1,4 @@
-"""The truth of a scene from MuJoCo's own kinematics and ray casting; nothing of vergence_rig's geometry is used."""
+"""Ground truth of a scene from MuJoCo's own kinematics and ray casting; vergence_rig's geometry is not used."""
 
 import math
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ Array = npt.NDArray[np.float64]
 
 _GRID = 6
 _SAME_SURFACE_M = 1e-3
-# What the head itself is made of hides nothing from its own eyes.
-_SEEN_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
+# The head's own parts do not occlude.
+_OCCLUDING_GROUPS = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class TrueBox:
 
 @dataclass(frozen=True)
 class Truth:
-    """What is true at one instant; fields as in TrueVergence.msg. Points are in rig_base [m]."""
+    """Ground truth at one instant; fields as in TrueVergence.msg. Points are in rig_base [m]."""
 
     target: str
     target_point_m: Array
@@ -56,8 +56,8 @@ class Truth:
     right_px: tuple[float, float]
 
 
-class TruthTeller:
-    """Asks a MuJoCo model where things are. Eyes are the bodies `left_camera`, `right_camera` and their cameras."""
+class GroundTruth:
+    """Reads a MuJoCo model. Eyes are the bodies `left_camera`, `right_camera` and their cameras."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, lenses: Mapping[str, Lens]) -> None:
         self._model, self._data = model, data
@@ -76,19 +76,19 @@ class TruthTeller:
 
     @property
     def objects(self) -> tuple[str, ...]:
-        """What there are boxes of: the targets and further cubes, seen or not."""
+        """Names of the objects that have boxes: the targets and extra cubes, visible or not."""
         return tuple(self._geoms)
 
     def target_point_world(self, target: str) -> Array:
-        """Return where the ray from the rig's origin through the target's centre meets the target's surface (3,)."""
+        """Return where the ray from the rig's origin through the target's centre meets its surface (3,), in world."""
         origin = np.array(self._data.body("rig_base").xpos)
         centre = np.array(self._data.body(target).xpos)
         direction = centre - origin
         distance = self._cast(origin, direction, self._geoms[target])
         return origin + direction * distance if math.isfinite(distance) else centre
 
-    def look(self, target: str, joints_rad: dict[str, float]) -> Truth:
-        """Return the truth about a target; the model's kinematics must be up to date."""
+    def evaluate(self, target: str, joints_rad: dict[str, float]) -> Truth:
+        """Return the ground truth about a target; the model's kinematics must be up to date."""
         data = self._data
         base = data.body("rig_base")
         point = self.target_point_world(target)
@@ -115,11 +115,11 @@ class TruthTeller:
         )
 
     def mean_disparity(self, target: str, grid: int) -> float:
-        """Return the mean disparity of the target's surface that both eyes see [px], from grid x grid rays an eye."""
+        """Return the mean disparity [px] of the target's surface that both eyes see, from grid x grid rays per eye."""
         return self._mean_disparity(self._samples(target, grid)[0])
 
     def project(self, eye: str, point: Array) -> tuple[float, float]:
-        """Return where a world point is in an eye's image, before its lens distorts it [px]; NaN behind it."""
+        """Return the undistorted pixel (x, y) of a world point in an eye's image; NaN behind the eye."""
         ((x, y),) = self._project(eye, np.asarray(point)[None]).tolist()
         return x, y
 
@@ -146,7 +146,7 @@ class TruthTeller:
         )
 
     def _project(self, eye: str, points: Array) -> Array:
-        """Return where world points (N, 3) are in an eye's undistorted image (N, 2) [px]; NaN behind it."""
+        """Return the undistorted pixels (N, 2) of world points (N, 3); NaN behind the eye."""
         origin, rotation = self._camera(eye)
         spec = self._lenses[eye].camera
         # MuJoCo's cameras look along -z with y up.
@@ -165,7 +165,7 @@ class TruthTeller:
         return math.acos(max(-1.0, min(1.0, float(axis @ ray) / float(np.linalg.norm(ray)))))
 
     def axis_errors(self, point: Array) -> tuple[float, float, float]:
-        """Return how much vergence, version and tilt are short of the target [rad], in the tilt bar's own axes."""
+        """Return the errors (vergence, version, tilt) to a world point [rad], in the tilt bar's own axes."""
         bar = self._data.body("tilt_bar")
         rotation = np.array(bar.xmat).reshape(3, 3)
         wanted, present = {}, {}
@@ -203,7 +203,7 @@ class TruthTeller:
         return points
 
     def _samples(self, target: str, grid: int = _GRID) -> tuple[Array, dict[str, float]]:
-        """Sample the target's surface through both eyes' images: points (N, 3) that both see, and each eye's share."""
+        """Return samples (N, 3) of the target's surface that both eyes see, and the share that each eye sees."""
         samples: list[Array] = []
         shares: dict[str, float] = {}
         for eye, other in (("left", "right"), ("right", "left")):
@@ -223,7 +223,7 @@ class TruthTeller:
         return np.column_stack([u.ravel(), v.ravel()])
 
     def surface(self, eye: str, target: str, pixels: Array) -> Array:
-        """Return where the rays of undistorted pixels (N, 2) of an eye meet an object, hidden or not: (M, 3)."""
+        """Return where the rays of undistorted pixels (N, 2) of an eye meet an object (M, 3), occluded or not."""
         origin, rotation = self._camera(eye)
         spec = self._lenses[eye].camera
         rays = np.column_stack(
@@ -239,7 +239,7 @@ class TruthTeller:
         return np.asarray(origin + directions[met] * distances[met, None])
 
     def sees(self, eye: str, points: Array) -> npt.NDArray[np.bool_]:
-        """Return which world points (N, 3) lie in an eye's image with nothing before them (N,)."""
+        """Return which world points (N, 3) lie in an eye's image and are not occluded (N,)."""
         spec = self._lenses[eye].camera
         with np.errstate(invalid="ignore"):
             u, v = self._project(eye, points).T
@@ -248,7 +248,7 @@ class TruthTeller:
         lengths = np.linalg.norm(points - origin, axis=1)
         for index in np.flatnonzero(inside):
             direction = (points[index] - origin) / lengths[index]
-            nearest = mujoco.mj_ray(self._model, self._data, origin, direction, _SEEN_GROUPS, True, -1, self._hit)
+            nearest = mujoco.mj_ray(self._model, self._data, origin, direction, _OCCLUDING_GROUPS, True, -1, self._hit)
             inside[index] = nearest < 0 or nearest > lengths[index] - _SAME_SURFACE_M
         return inside
 
@@ -258,7 +258,7 @@ class TruthTeller:
         return float((self._project("left", samples)[:, 0] - self._project("right", samples)[:, 0]).mean())
 
     def _cast(self, origin: Array, direction: Array, geoms: list[int]) -> float:
-        """Return how far along `direction` the nearest of `geoms` lies, in its lengths; inf if it meets none."""
+        """Return the distance to the nearest of `geoms` in lengths of `direction`; inf if the ray meets none."""
         nearest = math.inf
         for geom in geoms:
             kind = int(self._model.geom_type[geom])

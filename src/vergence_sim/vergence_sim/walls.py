@@ -16,7 +16,7 @@ Face = Callable[[np.random.Generator, tuple[int, int]], Image]
 def wall(rng: np.random.Generator, size_m: tuple[float, float], base: Face, first: list[Face]) -> Image:
     """Return a wall of (width, height) with pictures hung on it, their shadows, and the dusk of its corners.
 
-    `base` is what it is made of; `first` are pictures that are hung before others.
+    `base` is what it is made of; `first` are pictures that are hung first.
     """
     width, height = (round(side * PX_PER_M) for side in size_m)
     made = base(rng, (height, width)).astype(np.float32)

@@ -115,7 +115,7 @@ def stations(baseline_m: float, short: bool = False) -> list[Station]:
         "0.6 m, moving to and fro across the line of sight",
         "cube",
         _at(0.6, 0.0, 0.0),
-        motion={"motion": "sinusoid", "motion_y_m": 0.06, "motion_frequency_hz": 0.12},
+        motion={"motion.kind": "sinusoid", "motion.y_m": 0.06, "motion.frequency_hz": 0.12},
         hold_s=7.0,
     )
     if short:

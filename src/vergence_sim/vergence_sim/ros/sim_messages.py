@@ -1,4 +1,4 @@
-"""The simulator's values as messages."""
+"""Converts the simulator's values to messages."""
 
 from collections.abc import Mapping
 
@@ -21,7 +21,7 @@ def joint_state(stamp: Time, angles_rad: Mapping[str, float]) -> JointState:
 
 
 def camera_info(header: Header, lens: Lens) -> CameraInfo:
-    """Return what a perfect calibration of this camera would find."""
+    """Return the exact calibration of this camera."""
     camera = lens.camera
     matrix = [camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0]
     projection = [camera.fx_px, 0.0, camera.cx_px, 0.0, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 0.0, 1.0, 0.0]

@@ -1,4 +1,4 @@
-"""sim_node: the simulated head and room in real time; speaks as cameras, servos and ground truth."""
+"""sim_node: the simulated head and room in real time, with the topics of cameras, servos and ground truth."""
 
 import functools
 import threading
@@ -34,17 +34,16 @@ EYES = ("left", "right")
 
 
 class SimNode(Node):
-    """One thread owns the simulator and its OpenGL context; callbacks only leave it notes.
+    """One thread owns the simulator and its OpenGL context; callbacks put commands into a queue that it drains.
 
-    A second one makes pictures of what was exposed, while the first goes on rendering.
+    A second thread turns exposures into images (blur, lens, noise, JPEG) while the first goes on rendering.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__("sim_node", **options)
         settings = declare(self, GROUPS)
-        parameters: SimParameters = settings.value
-        self._rig = load_rig(parameters.rig)
-        self._settings = parameters
+        self._settings = _parameters(settings)
+        self._rig = load_rig(self._settings.simulation.rig)
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
         self._images = {eye: qos.create_publisher(Image, f"{eye}/image_raw", IMAGE_QOS) for eye in EYES}
@@ -65,7 +64,7 @@ class SimNode(Node):
             ),
         ]
         settings.on_change(self._on_settings)
-        self._notes: deque[tuple[str, Any, float]] = deque()
+        self._commands: deque[tuple[str, Any, float]] = deque()
         self._published = dict.fromkeys(EYES, 0)
         self._dropped = 0
         self._refused: list[str] = []
@@ -74,39 +73,43 @@ class SimNode(Node):
         self._failure: BaseException | None = None
         diagnostics.add("cameras", self._report_cameras)
         diagnostics.add("commands", self._report_commands)
-        # Starting as one thread, so that what cannot be rendered ends the node with its reason.
-        self._darkroom = ThreadPoolExecutor(1, "darkroom")
+        # One thread: a sensor's noise is drawn in the order of its exposures.
+        self._image_pool = ThreadPoolExecutor(1, "images")
         self._thread = threading.Thread(target=self._run, name="simulation", daemon=True)
         self._thread.start()
+        # A simulator that cannot start ends the node with its reason.
         self._started.wait()
         if self._failure is not None:
             raise OSError(str(self._failure)) from self._failure
-        self.get_logger().info("the room is ready")
+        self.get_logger().info("the simulated head and room are ready")
 
     def close(self) -> None:
         """End the simulation."""
         self._stop.set()
         self._thread.join(timeout=5.0)
-        self._darkroom.shutdown()
+        self._image_pool.shutdown()
 
     def _now_s(self) -> float:
         return float(self.get_clock().now().nanoseconds) * 1e-9
 
     def _on_command(self, message: JointState) -> None:
         if len(message.name) != len(message.position):
-            self._refuse(f"joint_command names {len(message.name)} joints with {len(message.position)} positions")
+            self._refuse(
+                f"joint_command must give one position per joint: got {len(message.name)} joints with "
+                f"{len(message.position)} positions"
+            )
             return
         angles = dict(zip(message.name, message.position, strict=True))
-        self._notes.append(("command", angles, self._now_s()))
+        self._commands.append(("command", angles, self._now_s()))
 
     def _on_place(self, what: str, message: PointStamped) -> None:
         if message.header.frame_id not in ("", "rig_base"):
-            self._refuse(f"sim/{what}_pose is in frame {message.header.frame_id!r}: allowed is 'rig_base'")
+            self._refuse(f"frame of sim/{what}_pose must be 'rig_base': got {message.header.frame_id!r}")
             return
-        self._notes.append((what, (message.point.x, message.point.y, message.point.z), self._now_s()))
+        self._commands.append((what, (message.point.x, message.point.y, message.point.z), self._now_s()))
 
     def _on_settings(self, settings: ParameterSet) -> None:
-        self._notes.append(("settings", settings.value, self._now_s()))
+        self._commands.append(("settings", _parameters(settings), self._now_s()))
 
     def _run(self) -> None:
         try:
@@ -125,7 +128,7 @@ class SimNode(Node):
                 if wait_s > 0:
                     self._stop.wait(min(wait_s, 0.1))
                     continue
-                self._take_notes(simulator, schedule, start_s)
+                self._drain_commands(simulator, schedule, start_s)
                 self._handle(schedule.pop(now_s), simulator, schedule, start_s)
                 self._dropped = schedule.dropped
         except Exception as error:
@@ -135,21 +138,21 @@ class SimNode(Node):
         finally:
             simulator.close()
 
-    def _take_notes(self, simulator: Simulator, schedule: Schedule, start_s: float) -> None:
-        while self._notes:
-            kind, value, arrived_s = self._notes.popleft()
+    def _drain_commands(self, simulator: Simulator, schedule: Schedule, start_s: float) -> None:
+        while self._commands:
+            kind, value, arrived_s = self._commands.popleft()
             try:
                 if kind == "command":
                     simulator.command(value, arrived_s - start_s)
                 elif kind == "target":
-                    simulator.place_target(simulator.parameters.target, value)
+                    simulator.place_target(simulator.parameters.target.object, value)
                 elif kind == "occluder":
                     simulator.place_occluder(value)
                 elif kind == "distractor":
                     simulator.place_distractor(value)
                 else:
                     simulator.set_parameters(value)
-                    schedule.set_jitter(value.effective().frame_jitter_s)
+                    schedule.set_jitter(value.effective().camera.frame_jitter_s)
             except (CommandError, TargetError) as error:
                 self._refuse(str(error))
 
@@ -165,9 +168,9 @@ class SimNode(Node):
                 self._true_joints.publish(joint_state(stamp, simulator.true_joints()))
             return
         header = Header(stamp=stamp, frame_id=f"{event.eye}_camera_optical_frame")
-        picture = self._darkroom.submit(simulator.expose(event.eye))
+        picture = self._image_pool.submit(simulator.expose(event.eye))
         info = camera_info(header, simulator.lenses[event.eye])
-        schedule.publish(event.eye, event.due_s + simulator.parameters.latency_s, (header, picture, info))
+        schedule.publish(event.eye, event.due_s + simulator.parameters.camera.latency_s, (header, picture, info))
         if event.eye == "left":
             self._publish_truth(stamp, simulator)
 
@@ -190,24 +193,28 @@ class SimNode(Node):
 
     def _refuse(self, reason: str) -> None:
         self._refused.append(reason)
-        self.get_logger().warning(f"refused, nothing moves: {reason}", throttle_duration_sec=1.0)
+        self.get_logger().warning(f"command refused, nothing moves: {reason}", throttle_duration_sec=1.0)
 
     def _report_cameras(self) -> Report:
         values: dict[str, object] = {f"{eye}_published": count for eye, count in self._published.items()}
-        values["dropped"] = self._dropped
+        values["dropped"], rate_hz = self._dropped, self._settings.camera.frame_rate_hz
         if self._failure is not None:
             return Report(WARN, f"the simulation stopped: {self._failure}", values)
         if self._dropped:
             return Report(
-                WARN, f"too slow for {self._settings.frame_rate_hz:g} Hz: {self._dropped} exposures dropped", values
+                WARN, f"this machine is too slow for {rate_hz:g} Hz: {self._dropped} exposures dropped", values
             )
-        return Report(OK, f"{self._settings.frame_rate_hz:g} Hz", values)
+        return Report(OK, f"both cameras run at {rate_hz:g} Hz", values)
 
     def _report_commands(self) -> Report:
         if self._refused:
             values = {"refused": len(self._refused), "joints": ", ".join(JOINT_NAMES)}
-            return Report(WARN, f"{len(self._refused)} refused, the last: {self._refused[-1]}", values)
-        return Report(OK, "none refused")
+            return Report(WARN, f"{len(self._refused)} commands refused, the last: {self._refused[-1]}", values)
+        return Report(OK, "no command refused")
+
+
+def _parameters(settings: ParameterSet) -> SimParameters:
+    return SimParameters(*(settings.get(group) for _, group in GROUPS))  # type: ignore[arg-type]
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -104,7 +104,7 @@ def head_nodes(rig: Path, **sim: object) -> dict[str, NodeCommand]:
     """Return the nodes of a simulated head by name, with their shipped YAML; `sim` are parameters of sim_node."""
     at = {"rig": str(rig)}
     return {
-        "sim_node": NodeCommand("vergence_sim", "sim_node", at | {"frame_rate_hz": FRAME_RATE_HZ} | sim),
+        "sim_node": NodeCommand("vergence_sim", "sim_node", at | {"camera.frame_rate_hz": FRAME_RATE_HZ} | sim),
         "edge_metric_node": NodeCommand("vergence_metric", "edge_metric_node", at),
         "box_metric_node": NodeCommand("vergence_metric", "box_metric_node", at | {"rate_hz": BOX_RATE_HZ}),
         "gaze_controller_node": NodeCommand("vergence_gaze", "gaze_controller_node", at),

@@ -63,7 +63,7 @@ class StationRunner:
             math.radians(station.start_tilt_deg),
         )
         recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._alive)
-        recorder.set_parameters("sim_node", {"target": station.target}, self._alive)
+        recorder.set_parameters("sim_node", {"target.object": station.target}, self._alive)
         if station.distractor_m:
             self._stage.put("distractor", station.distractor_m)
         self._stage.put("target", station.place_m or self._fixation_m())
@@ -87,7 +87,7 @@ class StationRunner:
         after = recorder.picture(station.has_boxes, self._alive)
         self._store(station, "end", after)
         if station.moving:
-            recorder.set_parameters("sim_node", {"motion": "static"}, self._alive)
+            recorder.set_parameters("sim_node", {"motion.kind": "static"}, self._alive)
         return self._result(station, began, marks, reason, before, after)
 
     def _fixation_m(self) -> Sequence[float]:
