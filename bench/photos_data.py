@@ -82,7 +82,7 @@ class KnownPoint:
 
 
 def grey_pair(name: str) -> tuple[Image, Image]:
-    """Return a pair in grey; "stereo_motorcycle" is scikit-image's, whose disparity was measured by structured light."""
+    """Return a pair in grey; "stereo_motorcycle" is scikit-image's, with disparity by structured light."""
     if name == "stereo_motorcycle":
         left, right, _ = _motorcycle()
         greys = [cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY) for image in (left, right)]

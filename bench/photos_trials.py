@@ -17,8 +17,8 @@ from vergence_sim.photo.pair import PhotoPair, PhotoPoint
 from vergence_sim.photo.world import PhotoWorld
 
 DURATION_S = 3.0
-REST_S = 0.6
-_AWAKE_S = 0.4
+REST_S = 0.5
+_AWAKE_S = 0.3
 _IN_VIEW_PX = 24.0
 _ASIDE_DEG, _VERGENCE_DEG = 0.35, 0.25
 _FALSE_ASIDE_DEG, _FALSE_VERGENCE_DEG = 1.0, 0.5
@@ -131,16 +131,14 @@ def start_of(world: PhotoWorld, pair: PhotoPair, point: PhotoPoint) -> dict[str,
     The right eye turns with the left one, so that the vergence at the start says nothing of the target.
     """
     camera, wanted = world.rig.left_camera, pair.fixation(point)
-    halves = 0.5 * camera.width_px - _IN_VIEW_PX, 0.5 * camera.height_px - _IN_VIEW_PX
-    across, down = (math.atan(half / focal) for half, focal in zip(halves, (camera.fx_px, camera.fy_px), strict=True))
-    furthest, nearest = wanted.pan_right_rad, wanted.pan_left_rad
-    low, high = max(furthest, nearest) - across, min(furthest, nearest) + across
-    pan = min(max(0.0, low), high) if low <= high else wanted.version_rad
+    # A zero that is off turns the eyes aside of what their driver reports.
+    margin_px = _IN_VIEW_PX + camera.fx_px * max(map(abs, world.head.plant.zero_rad.values()), default=0.0)
+    across = math.atan((0.5 * camera.width_px - margin_px) / camera.fx_px)
+    down = math.atan((0.5 * camera.height_px - margin_px) / camera.fy_px)
+    pans = wanted.pan_left_rad, wanted.pan_right_rad
+    pan = min(max(0.0, max(pans) - across), min(pans) + across)
     tilt = min(max(0.0, wanted.tilt_rad - down), wanted.tilt_rad + down)
-    plant, zero = world.head.plant, world.head.plant.zero_rad
-    true = {"pan_left": pan, "pan_right": pan, "tilt": tilt}
-    # Eyes that stand there, whatever their driver makes of it; a head whose zero is off has woken with it.
-    return {name: (angle - zero.get(name, 0.0) * (angle != 0.0)) / plant.angle_scale for name, angle in true.items()}
+    return {"pan_left": pan, "pan_right": pan, "tilt": tilt}
 
 
 def outcome_of(trial: Trial, trace: Trace, rig: Rig) -> Outcome:

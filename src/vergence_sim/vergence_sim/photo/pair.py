@@ -5,6 +5,7 @@ Any matrix is consistent: another one shows a projectively changed scene, in whi
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import cv2
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.geometry import EyeAngles
+from vergence_sim.photo.views import Padded, padded
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
@@ -58,6 +60,11 @@ class PhotoPair:
         self.fx_px = fx_px if fx_px > 0 else FOCAL_PER_WIDTH * self.width_px
         self.cx_px = 0.5 * (self.width_px - 1) if cx_px is None else cx_px
         self.cy_px = 0.5 * (self.height_px - 1) if cy_px is None else cy_px
+
+    @cached_property
+    def padded(self) -> tuple[Padded, Padded]:
+        """Both photographs with a margin for views that reach beyond them."""
+        return padded(self.left), padded(self.right)
 
     @property
     def matrix(self) -> Array:

@@ -6,6 +6,7 @@ edge; `outside_share` says how much of a view is such padding.
 """
 
 import math
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -29,19 +30,55 @@ def mount_rotation(roll_rad: float, pitch_rad: float) -> Array:
     return roll @ rotation_rig_from_eye(0.0, pitch_rad)
 
 
+@dataclass(frozen=True)
+class Padded:
+    """A photograph (h, w, 3) with a margin that makes no edge at its frame, and the colour (3,) beyond the margin."""
+
+    image: Image
+    beyond: tuple[float, ...]
+    width_px: int
+    height_px: int
+
+
+def padded(photograph: Image) -> Padded:
+    """Return a photograph (h, w, 3) BGR with its margin."""
+    height, width = photograph.shape[:2]
+    mean = photograph.reshape(-1, 3).mean(axis=0)
+    grown = cv2.copyMakeBorder(photograph, *(_MARGIN_PX,) * 4, cv2.BORDER_REPLICATE)
+    inside = np.zeros(grown.shape[:2], np.uint8)
+    inside[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX] = 1
+    away = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)[:, :, None] / np.float32(_MARGIN_PX)
+    faded = grown.astype(np.float32)
+    for step, sigma in enumerate(_BLUR_PX):
+        share = np.clip((away - 0.02 * step) / (0.06 + 0.1 * step), 0.0, 1.0)
+        faded += share * (_blurred(faded, sigma) - faded)
+    faded += np.minimum(away, 1.0) ** 2 * (mean.astype(np.float32) - faded)
+    image = np.clip(np.rint(faded), 0, 255).astype(np.uint8)
+    image[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX] = photograph
+    return Padded(image, tuple(mean.tolist()), width, height)
+
+
+def _blurred(image: npt.NDArray[np.float32], sigma: float) -> npt.NDArray[np.float32]:
+    """Return the image blurred by a Gaussian: wide ones at a fraction of the resolution, where they cost little."""
+    fraction = max(int(sigma) // 3, 1)
+    height, width = image.shape[:2]
+    small = cv2.resize(image, (width // fraction, height // fraction), interpolation=cv2.INTER_AREA)
+    small = cv2.GaussianBlur(small, (0, 0), sigma / fraction)
+    return np.asarray(cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+
+
 class PhotoEye:
     """Warps one photograph to what an eye sees of it, and points to where it sees them.
 
     Args:
-        photograph: (h, w, 3) BGR.
+        photograph: with its margin.
         matrix: (3, 3) camera matrix of the photograph.
         lens: the eye's camera; it distorts the view.
         mount: (3, 3) rotation of the camera in its mount.
     """
 
-    def __init__(self, photograph: Image, matrix: Array, lens: Lens, mount: Array) -> None:
-        self._height, self._width = photograph.shape[:2]
-        self._padded, self._beyond = _padded(photograph)
+    def __init__(self, photograph: Padded, matrix: Array, lens: Lens, mount: Array) -> None:
+        self._photograph = photograph
         self._lens, self._mount = lens, mount
         self._matrix = matrix
         shift = np.array([[1.0, 0.0, _MARGIN_PX], [0.0, 1.0, _MARGIN_PX], [0.0, 0.0, 1.0]])
@@ -59,12 +96,12 @@ class PhotoEye:
         homography = self._padded_from_rig @ self._rig_from_optical(pan_rad, tilt_rad) @ self._rays_of_view
         return np.asarray(
             cv2.warpPerspective(
-                self._padded,
+                self._photograph.image,
                 homography,
                 self._size,
                 flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
                 borderMode=cv2.BORDER_CONSTANT,
-                borderValue=self._beyond,
+                borderValue=self._photograph.beyond,
             ),
             np.uint8,
         )
@@ -76,7 +113,8 @@ class PhotoEye:
         rays = self._rig_from_optical(pan_rad, tilt_rad) @ self._rays_of_view @ pixels
         x, y, depth = self._matrix @ _PHOTO_FROM_RIG @ rays
         x, y = x / depth, y / depth
-        inside = (depth > 0) & (x >= 0) & (x <= self._width - 1) & (y >= 0) & (y <= self._height - 1)
+        inside = (depth > 0) & (x >= 0) & (x <= self._photograph.width_px - 1)
+        inside &= (y >= 0) & (y <= self._photograph.height_px - 1)
         return 1.0 - float(inside.mean())
 
     def project(self, ray: Array, pan_rad: float, tilt_rad: float) -> tuple[float, float]:
@@ -90,21 +128,3 @@ class PhotoEye:
 
     def _rig_from_optical(self, pan_rad: float, tilt_rad: float) -> Array:
         return rotation_rig_from_eye(pan_rad, tilt_rad) @ self._mount @ ROTATION_EYE_FROM_OPTICAL
-
-
-def _padded(photograph: Image) -> tuple[Image, tuple[float, ...]]:
-    """Return the photograph with a margin that makes no edge at its frame, and the colour beyond the margin."""
-    mean = photograph.reshape(-1, 3).mean(axis=0)
-    margins = (_MARGIN_PX,) * 4
-    grown = cv2.copyMakeBorder(photograph, *margins, cv2.BORDER_REPLICATE)
-    inside = np.zeros(grown.shape[:2], np.uint8)
-    inside[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX] = 1
-    away = cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)[:, :, None] / _MARGIN_PX
-    faded = grown.astype(np.float32)
-    for step, sigma in enumerate(_BLUR_PX):
-        share = np.clip((away - 0.02 * step) / (0.06 + 0.1 * step), 0.0, 1.0)
-        faded += share * (cv2.GaussianBlur(faded, (0, 0), sigma) - faded)
-    faded += np.clip(away, 0.0, 1.0) ** 2 * (mean - faded)
-    padded = np.rint(faded).astype(np.uint8)
-    padded[_MARGIN_PX:-_MARGIN_PX, _MARGIN_PX:-_MARGIN_PX] = photograph
-    return padded, tuple(mean.tolist())

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import CameraSpec, Rig, default_rig
-from vergence_sim.optics import Lens, Sensor, smeared
+from vergence_sim.optics import Lens, Sensor, motion_blurred
 from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.joints import PhotoHead, Plant
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint
@@ -41,9 +41,9 @@ class PhotoWorld:
         cameras = {"left": self.rig.left_camera, "right": self.rig.right_camera}
         mounts = {"left": (p.left_camera.roll_rad, 0.0), "right": (p.right_camera.roll_rad, p.right_camera.pitch_rad)}
         self.lenses = {eye: Lens(camera, p.camera.distortion) for eye, camera in cameras.items()}
-        photographs = {"left": pair.left, "right": pair.right}
         self._eyes = {
-            eye: PhotoEye(photographs[eye], pair.matrix, self.lenses[eye], mount_rotation(*mounts[eye])) for eye in EYES
+            eye: PhotoEye(photograph, pair.matrix, self.lenses[eye], mount_rotation(*mounts[eye]))
+            for eye, photograph in zip(EYES, pair.padded, strict=True)
         }
         seeds = np.random.SeedSequence(p.simulation.seed).spawn(2)
         self._sensors = {
@@ -75,7 +75,7 @@ class PhotoWorld:
         motion_px = smear * rates[pan], smear * rates["tilt"]
 
         def develop() -> Image:
-            view = smeared(self._eyes[eye].view(joints[pan], joints["tilt"]), motion_px)
+            view = motion_blurred(self._eyes[eye].view(joints[pan], joints["tilt"]), motion_px)
             return self._sensors[eye].apply(lens.apply(view), parameters)
 
         return develop

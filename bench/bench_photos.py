@@ -1,0 +1,65 @@
+"""Clicks on real photographs, in closed loop: the shipped metric and controller before exact views of stereo pairs.
+
+A trial is on target if it was declared verged within 3 s and then rested at most 0.35 degrees aside of the point that
+was clicked (version, tilt) and 0.25 degrees off in vergence; falsely verged if it was declared at any time while more
+than 1 degree aside or 0.5 degrees off in vergence. VERGENCE_PHOTO_CLICKS sets the clicks on each pair (24 at most).
+"""
+
+import multiprocessing
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+
+import cv2
+
+from bench import photos_disparity, photos_figures
+from bench.harness import Row, table
+from bench.photos_data import NoPhotographsError, pair_names
+from bench.photos_trials import Outcome, Trial
+from bench.photos_trials import run as run_trial
+
+__all__ = ["run", "table"]
+
+CLICKS = 6
+_PROCESSES = 2
+_TRIALS_OF_A_JOB = 4
+
+
+def run(say: Callable[[str], None], clicks: int | None = None) -> list[Row]:
+    """Run all clicks and the disparity's points, and return the rows; without photographs only the motorcycle's."""
+    clicks = clicks or int(os.environ.get("VERGENCE_PHOTO_CLICKS", CLICKS))
+    try:
+        pair_names()
+    except NoPhotographsError as error:
+        say(f"clicks skipped: {error}")
+        return _disparity_rows(say, from_photographs=False)
+    outcomes = _outcomes(photos_figures.trials(clicks), say)
+    for line in (*photos_figures.by_pair(outcomes), "", *photos_figures.reasons(outcomes)):
+        say(line)
+    return photos_figures.rows(outcomes, clicks) + _disparity_rows(say, from_photographs=True)
+
+
+def _outcomes(trials: list[Trial], say: Callable[[str], None]) -> list[Outcome]:
+    # Before numpy is loaded anew in every process: its own threads would only contend.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    began, said = time.monotonic(), 0
+    outcomes: list[Outcome] = []
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(max_workers=_PROCESSES, mp_context=context) as pool:
+        for outcome in pool.map(run_trial, trials, chunksize=_TRIALS_OF_A_JOB):
+            outcomes.append(outcome)
+            if len(outcomes) >= said + len(trials) // 8 or len(outcomes) == len(trials):
+                said = len(outcomes)
+                say(f"{said} of {len(trials)} clicks, {time.monotonic() - began:.0f} s")
+    return outcomes
+
+
+def _disparity_rows(say: Callable[[str], None], from_photographs: bool) -> list[Row]:
+    say(f"disparity at {photos_disparity.POINTS} points")
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        return photos_disparity.rows(photos_disparity.known_points(photos_disparity.POINTS, from_photographs))
+    finally:
+        cv2.setNumThreads(threads)
