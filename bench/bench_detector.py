@@ -32,7 +32,7 @@ def run(say: Callable[[str], None]) -> list[Row]:
     """Render, detect, score."""
     with_target = _views(TARGET_SEEDS, VIEWS_WITH_TARGET, 1.0, say)
     empty = _views(EMPTY_SEEDS, VIEWS_WITHOUT, 0.0, say)
-    everything = Detector(DetectorParameters(threshold=0.01, max_det=50))
+    everything = Detector(DetectorParameters(threshold=0.01, max_objects=50))
     say(everything.describe())
     results = [(view, everything.detect(view.image)) for view in with_target]
     whole = [_result(view, found, LEAST_PX, np.inf) for view, found in results]

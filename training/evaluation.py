@@ -48,7 +48,7 @@ class Scores:
 
 def evaluate(model: Path, data: Shard) -> Scores:
     """Score a model file on renders."""
-    detector = Detector(DetectorParameters(model=str(model), threshold=0.01, max_det=50))
+    detector = Detector(DetectorParameters(model=str(model), threshold=0.01, max_objects=50))
     found = [detector.detect(image) for image in data.images]
     whole, small, empty_scores, best_of_cubes = [], [], [], []
     for i, detections in enumerate(found):

@@ -17,6 +17,7 @@ from vergence_common.images import array_to_image, image_to_array
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_metric.boxes import DetectorError
+from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.ros.box_metric_node import BoxMetricNode
 from vergence_msgs.msg import BoxVergence, StereoDetections
 
@@ -110,7 +111,7 @@ def model(tmp_path: Path) -> str:
 
 @pytest.fixture
 def node(graph: Any, model: str) -> BoxMetricNode:
-    node: BoxMetricNode = graph.start(BoxMetricNode, model=model, threshold=0.5)
+    node: BoxMetricNode = graph.start(BoxMetricNode, **{"detector.model": model, "detector.threshold": 0.5})
     return node
 
 
@@ -168,7 +169,7 @@ def test_one_eye_blind_is_said_and_not_zero(graph: Any, node: BoxMetricNode) -> 
     assert message.left.x_min_px == 63.5
 
 
-def test_detections_and_picture_come_when_somebody_listens(graph: Any, node: BoxMetricNode) -> None:
+def test_detections_and_picture_are_published_while_subscribed(graph: Any, node: BoxMetricNode) -> None:
     eyes = Eyes(graph)
     assert node._overlay_publisher.get_subscription_count() == 0
     answer(graph, node, eyes, scene(64), scene(48))
@@ -214,17 +215,17 @@ def test_it_can_be_switched_off_and_on(graph: Any, node: BoxMetricNode) -> None:
 
 
 def test_parameters_that_cannot_be_are_refused_and_nothing_changes(graph: Any, node: BoxMetricNode) -> None:
-    refused = graph.set_parameters(node, classes=["cube"], threshold=0.9)
+    refused = graph.set_parameters(node, **{"detector.classes": ["cube"], "detector.threshold": 0.9})
     assert not refused.successful
-    assert "class is 'cube': the model has square" in refused.reason
-    assert node._settings.value.threshold == 0.5
-    assert graph.set_parameters(node, classes=["square"]).successful
-    assert not graph.set_parameters(node, threshold=1.5).successful
+    assert "class must be one of the model's (square): got 'cube'" in refused.reason
+    assert node._settings.get(DetectorParameters).threshold == 0.5
+    assert graph.set_parameters(node, **{"detector.classes": ["square"]}).successful
+    assert not graph.set_parameters(node, **{"detector.threshold": 1.5}).successful
 
 
 def test_a_model_that_is_not_there_ends_the_node_with_one_line(graph: Any) -> None:
     with pytest.raises(DetectorError, match=r"model /nowhere/gone\.onnx: no such file"):
-        BoxMetricNode(context=graph.context, parameter_overrides=_overrides(model="/nowhere/gone.onnx"))
+        BoxMetricNode(context=graph.context, parameter_overrides=_overrides(**{"detector.model": "/nowhere/gone.onnx"}))
 
 
 def _overrides(**values: Any) -> list[Any]:

@@ -16,6 +16,8 @@ from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node, PushRosNamespace
 from launch_ros.parameter_descriptions import ParameterValue
 
+from vergence_bringup.node_table import NODES
+
 
 def generate_launch_description() -> LaunchDescription:
     config = Path(get_package_share_directory("vergence_bringup")) / "config"
@@ -33,7 +35,7 @@ def generate_launch_description() -> LaunchDescription:
     def camera(eye: str, lock: str, partner: Any = "") -> Node:
         # camera_node publishes image_raw and camera_info relative to its namespace: left/... and right/...
         return Node(
-            package="vergence_camera",
+            package=NODES["camera_node"].package,
             executable="camera_node",
             name="camera_node",
             namespace=eye,
@@ -56,9 +58,9 @@ def generate_launch_description() -> LaunchDescription:
 
     left_camera = PythonExpression(["'/' + '", LaunchConfiguration("namespace"), "/left/camera_node'.strip('/')"])
 
-    def node(package: str, executable: str, condition: str | None = None, **parameters: object) -> Node:
+    def node(executable: str, condition: str | None = None, **parameters: object) -> Node:
         return Node(
-            package=package,
+            package=NODES[executable].package,
             executable=executable,
             output="screen",
             parameters=[*settings(executable), {"rig": rig, **parameters}],
@@ -92,11 +94,16 @@ def generate_launch_description() -> LaunchDescription:
                     PushRosNamespace(LaunchConfiguration("namespace")),
                     camera("left", "hold"),
                     camera("right", "follow", left_camera),
-                    node("vergence_metric", "edge_metric_node"),
-                    node("vergence_metric", "box_metric_node", "detector", model=text(LaunchConfiguration("model"))),
-                    node("vergence_metric", "eye_rotation_node", "encoder"),
-                    node("vergence_gaze", "gaze_controller_node"),
-                    node("vergence_servo", "servo_node", "servos"),
+                    node("edge_metric_node"),
+                    node(
+                        "vergence_metric",
+                        "box_metric_node",
+                        "detector",
+                        **{"detector.model": text(LaunchConfiguration("model"))},
+                    ),
+                    node("eye_rotation_node", "encoder"),
+                    node("gaze_controller_node"),
+                    node("servo_node", "servos"),
                 ]
             ),
         ]

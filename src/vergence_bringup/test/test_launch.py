@@ -77,4 +77,4 @@ def test_the_lock_can_be_left_off():
 def test_a_model_of_ones_own_reaches_the_detector():
     arguments = {**CAMERAS, "detector": "true", "model": "/models/fruit.onnx"}
     (told,) = (told for name, told in nodes("rig.launch.py", **arguments) if name == "box_metric_node")
-    assert told["model"] == "/models/fruit.onnx"
+    assert told["detector.model"] == "/models/fruit.onnx"

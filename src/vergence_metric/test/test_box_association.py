@@ -9,18 +9,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric.boxes.appearance import likeness, signature
-from vergence_metric.boxes.association import _best_together, associate
+from vergence_metric.boxes.assignment import optimal_assignment
+from vergence_metric.boxes.association import associate
 from vergence_metric.boxes.corner_metric import corner_metric, hidden_sides
 from vergence_metric.boxes.detections import Box
 from vergence_metric.boxes.following import TargetMemory
 from vergence_metric.boxes.pair_geometry import PairGeometry
-from vergence_metric.boxes.parameters import BoxMetricParameters
+from vergence_metric.boxes.parameters import AssociationParameters, FollowParameters
+from vergence_metric.boxes.patch_descriptor import descriptor_correlation, patch_descriptor
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, gaze_for_point, rotation_rig_from_optical
 from vergence_rig.rig import default_rig
 
-P = BoxMetricParameters()
+P = AssociationParameters()
+FOLLOW = FollowParameters()
 SIZE = (640, 480)
 CUT_LEFT, CUT_TOP, CUT_RIGHT, CUT_BOTTOM = ((i == 0, i == 1, i == 2, i == 3) for i in range(4))
 
@@ -89,7 +91,7 @@ def test_what_the_boxes_hold_settles_it():
     found = associate(left, right, P, images=(images[0], images[1]))
     assert {(p.left.center_px[0], p.right.center_px[0]) for p in found.pairs} == {(299.5, 179.5), (419.5, 249.5)}
     assert not any(p.ambiguous for p in found.pairs)
-    same = likeness(signature(images[0], left[0]), signature(images[1], right[1]))
+    same = descriptor_correlation(patch_descriptor(images[0], left[0]), patch_descriptor(images[1], right[1]))
     assert same is not None
     assert same > 0.95
 
@@ -147,7 +149,7 @@ def test_the_pairing_is_the_best_of_all(rows, columns, seed):
     rng = np.random.default_rng(seed)
     costs = rng.uniform(0, 10, (rows, columns))
     costs[rng.random((rows, columns)) < 0.4] = math.inf
-    chosen = _best_together(costs)
+    chosen = optimal_assignment(costs)
     assert len({i for i, _ in chosen}) == len({j for _, j in chosen}) == len(chosen)
     best = (0, 0.0)
     for count in range(min(rows, columns), 0, -1):
@@ -199,7 +201,7 @@ def choose(memory, left, right, stamp_s, setup=None):
 
 
 def test_the_target_stays_the_target():
-    memory = TargetMemory(P)
+    memory = TargetMemory(FOLLOW)
     first, second = [box(200, 200, score=0.9), box(450, 300, score=0.6)], [box(180, 200, score=0.9), box(430, 300, 60)]
     assert choose(memory, first[:1], second[:1], 0.0).pair.left is first[0]
     stronger = box(452, 300, score=0.99)
@@ -207,11 +209,11 @@ def test_the_target_stays_the_target():
     assert found.pair.left.center_px[0] == 205
     # Gone for a moment: nothing else is taken for it, and then something is.
     assert choose(memory, [stronger], second[1:], 0.2).pair is None
-    assert choose(memory, [stronger], second[1:], 0.1 + P.forget_s + 0.01).pair.left is stronger
+    assert choose(memory, [stronger], second[1:], 0.1 + FOLLOW.forget_after_s + 0.01).pair.left is stronger
 
 
 def test_the_target_is_known_again_though_the_eyes_turned():
-    memory = TargetMemory(P)
+    memory = TargetMemory(FOLLOW)
     choose(memory, [box(419.5, 239.5)], [box(419.5, 239.5)], 0.0, geometry())
     turned = geometry(EyeAngles(-0.2, -0.2, 0.0))
     there = turned.pixel(True, geometry().direction(True, (419.5, 239.5)))
@@ -222,18 +224,18 @@ def test_the_target_is_known_again_though_the_eyes_turned():
 
 
 def test_one_eye_blind():
-    memory = TargetMemory(P)
+    memory = TargetMemory(FOLLOW)
     seen = box(300, 200)
     assert choose(memory, [seen], [], 0.0).left is seen
-    assert choose(TargetMemory(P), [], [seen], 0.0).right is seen
-    nothing = choose(TargetMemory(P), [], [], 0.0)
+    assert choose(TargetMemory(FOLLOW), [], [seen], 0.0).right is seen
+    nothing = choose(TargetMemory(FOLLOW), [], [], 0.0)
     assert nothing.pair is None
     assert nothing.left is None
     assert nothing.right is None
 
 
 def test_the_past_settles_an_ambiguous_pair():
-    memory = TargetMemory(P)
+    memory = TargetMemory(FOLLOW)
     choose(memory, [box(300, 200)], [box(200, 200)], 0.0)
     boxes = [box(302, 200)], [box(272, 200), box(202, 201)]
     assert associate(*boxes, P).pairs[0].ambiguous
@@ -244,7 +246,7 @@ def test_the_past_settles_an_ambiguous_pair():
 
 
 def test_a_guess_does_not_become_the_past():
-    memory = TargetMemory(P)
+    memory = TargetMemory(FOLLOW)
     found = associate([box(300, 200)], [box(270, 200), box(200, 201)], P)
     assert found.pairs[0].ambiguous
     memory.choose(found, 0.0, SIZE, None)

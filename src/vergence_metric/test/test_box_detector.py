@@ -60,7 +60,7 @@ def test_nothing_in_view_gives_no_boxes(kind, onnx_model):
     assert found.xyxy_px.shape == (0, 4)
 
 
-def test_declared_shapes_are_not_believed(onnx_model):
+def test_declared_shapes_are_not_used(onnx_model):
     path = onnx_model("yolov6", declared=[1, 8400, 85])
     assert load(path).layout.name == "yolov6"
     assert len(load(path).detect(picture())) == 2
@@ -80,7 +80,7 @@ def test_channels_and_range_can_be_overridden(onnx_model):
     path = onnx_model("yolov6")
     swapped = load(path, color="bgr").detect(picture())
     assert swapped.class_ids.tolist() == [1]  # its class 0 now sees blue
-    byte = load(path, scale="byte", threshold=0.0, max_det=1).detect(picture())
+    byte = load(path, scale="byte", threshold=0.0, max_objects=1).detect(picture())
     assert byte.scores[0] == pytest.approx(255.0)
 
 
@@ -97,7 +97,7 @@ def test_a_shape_that_could_be_two_layouts_asks_for_one(tmp_path):
     rows[..., :4] = [64, 48, 72, 56]
     rows[..., 4], rows[..., 5] = np.linspace(0.9, 0.1, 252), 0.0
     path = constant_model(tmp_path, rows)
-    with pytest.raises(ModelLayoutError, match="could be yolov6 or yolox or yolov10: say which by 'layout'"):
+    with pytest.raises(ModelLayoutError, match=r"could be yolov6 or yolox or yolov10: say which by .*detector\.layout"):
         load(path)
     assert load(path, layout="yolov10").layout.name == "yolov10"
     assert load(path, layout="yolov6").layout.name == "yolov6"
@@ -127,17 +127,17 @@ def constant_model(folder: Path, output: np.ndarray, task: str = "") -> Path:
 
 
 def test_a_model_that_is_no_detector(tmp_path):
-    with pytest.raises(ModelLayoutError, match=r"output0 \[1, 1000\].*none of the known"):
+    with pytest.raises(ModelLayoutError, match=r"must have one of the detector layouts .*: got output0 \[1, 1000\]"):
         load(constant_model(tmp_path, np.zeros((1, 1000), np.float32)))
 
 
 def test_a_model_for_another_task(tmp_path):
-    with pytest.raises(ModelLayoutError, match="task is 'segment'"):
+    with pytest.raises(ModelLayoutError, match="task must be 'detect': got 'segment'"):
         load(constant_model(tmp_path, np.zeros((1, 37, 252), np.float32), task="segment"))
 
 
 def test_a_wanted_layout_that_does_not_fit(onnx_model):
-    with pytest.raises(ModelLayoutError, match="do not have the layout 'yolov8'"):
+    with pytest.raises(ModelLayoutError, match="must have the layout 'yolov8'"):
         load(onnx_model("yolov6"), layout="yolov8")
 
 
@@ -175,9 +175,9 @@ def test_classes_by_name_and_number(onnx_model):
     path = onnx_model("yolov6", names="{0: 'tomato', 1: 'leaf'}")  # as ultralytics writes them
     assert load(path, classes=("leaf",)).detect(picture()).class_names == ("leaf",)
     assert load(path, classes=("0",)).detect(picture()).class_names == ("tomato",)
-    with pytest.raises(ModelClassError, match="class is 'cube': the model has tomato, leaf"):
+    with pytest.raises(ModelClassError, match=r"class must be one of the model's \(tomato, leaf\): got 'cube'"):
         load(path, classes=("cube",))
-    with pytest.raises(ModelClassError, match="class is '2'"):
+    with pytest.raises(ModelClassError, match="got '2'"):
         load(path, classes=("2",))
 
 
@@ -189,18 +189,18 @@ def test_thresholds_can_change_while_running(onnx_model):
 
 def test_a_dynamic_input_gets_whole_strides(onnx_model):
     path = onnx_model("yolov6", fixed=False, metadata={"stride": "32"})
-    detector = load(path, imgsz_width=120, imgsz_height=70)
+    detector = load(path, input_width_px=120, input_height_px=70)
     assert detector.input_px == (128, 96)
 
 
 def test_a_device_that_is_not_there(onnx_model):
-    with pytest.raises(DetectorError, match=r"device is 'coreml': this onnxruntime has .*cpu"):
+    with pytest.raises(DetectorError, match=r"this onnxruntime has \(.*cpu\): got 'coreml'"):
         load(onnx_model("yolov6"), device="coreml")
 
 
 @pytest.mark.parametrize("image", [np.zeros((4, 4, 4), np.uint8), np.zeros((4, 4, 3)), np.zeros((0, 4, 3), np.uint8)])
 def test_images_that_are_none(image, onnx_model):
-    with pytest.raises(DetectorImageError, match="allowed is uint8"):
+    with pytest.raises(DetectorImageError, match="image must be uint8"):
         load(onnx_model("yolov6")).detect(image)
 
 

@@ -5,7 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence_metric.boxes.detections import cut_sides, make_detections
-from vergence_metric.boxes.letterbox import RESIZES, Letterbox, blob
+from vergence_metric.boxes.letterbox import RESIZES, Letterbox
+from vergence_metric.boxes.preprocessing import Preprocessing
 from vergence_metric.boxes.suppression import suppress
 
 sides = st.integers(32, 2000)
@@ -60,14 +61,14 @@ def test_halving_keeps_the_mean():
     assert np.abs(small - mean).max() <= 1.0
 
 
-def test_the_blob_is_planes_of_the_wanted_order():
+def test_the_tensor_is_planes_of_the_wanted_order():
     picture = np.zeros((4, 6, 3), np.uint8)
     picture[..., 2] = 255
-    rgb = blob(picture, "rgb", True, np.float32)
+    rgb = Preprocessing("rgb", True, "letterbox").tensor([picture], np.float32)
     assert rgb.shape == (1, 3, 4, 6)
     assert rgb[0, 0].min() == 1.0
     assert rgb[0, 1:].max() == 0.0
-    bgr = blob(picture, "bgr", False, np.float16)
+    bgr = Preprocessing("bgr", False, "letterbox").tensor([picture], np.float16)
     assert bgr.dtype == np.float16
     assert bgr[0, 2].min() == 255.0
 

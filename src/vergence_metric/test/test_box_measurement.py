@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from vergence_metric.boxes import BoxMeasurement, BoxStatus, DetectorError, draw, measure_pair
 from vergence_metric.boxes.box_overlay import overlay_lines
 from vergence_metric.boxes.detections import Box
-from vergence_metric.boxes.parameters import BoxMetricNodeParameters
+from vergence_metric.boxes.parameters import BoxMetricParameters, DetectorParameters
 from vergence_metric.boxes.refinement import refine
 from vergence_metric.boxes.smoothing import LagLimitedFilter
 from vergence_metric.boxes.target_point import locate
@@ -33,7 +33,7 @@ def scene(x, y=1, width=128, height=96, red=255):
 @pytest.fixture
 def measurement(onnx_model):
     path = str(onnx_model("yolov6", classes=1, names='{"0": "cube"}'))
-    return BoxMeasurement(BoxMetricNodeParameters(model=path, threshold=0.5), BASELINE_M)
+    return BoxMeasurement(BoxMetricParameters(DetectorParameters(model=path, threshold=0.5)), BASELINE_M)
 
 
 def test_a_pair_in_both_eyes(measurement):
@@ -93,7 +93,7 @@ def test_angles_and_place_with_cameras_and_joints(measurement):
 
 def test_measure_pair_is_one_call(onnx_model):
     path = onnx_model("yolov6", classes=1)
-    result = measure_pair(scene(48), scene(32), path, BoxMetricNodeParameters(threshold=0.5))
+    result = measure_pair(scene(48), scene(32), path, BoxMetricParameters(DetectorParameters(threshold=0.5)))
     assert result.center_px[0] == 16.0
     with pytest.raises(DetectorError, match="right image"):
         measure_pair(scene(48), scene(32, width=160), path)

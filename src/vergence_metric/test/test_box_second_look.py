@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence_metric.boxes import Detector
-from vergence_metric.boxes.decoding import Raw
+from vergence_metric.boxes.layouts import Candidates
 from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.boxes.second_look import CROP_PX, MOST_LOOKS, Window, look_again
 from vergence_metric.boxes.session import SHIPPED_MODEL
@@ -36,7 +36,7 @@ def brightest(crop):
     grey = (crop[..., 0].astype(float) - 40) / 215
     rows, columns = grey.max(1), grey.max(0)
     if rows.max() < 0.5:
-        return Raw(np.empty((0, 4)), np.empty(0), np.empty(0, np.int64))
+        return Candidates(np.empty((0, 4)), np.empty(0), np.empty(0, np.int64))
 
     def sides(line):
         first = int(line.argmax())
@@ -45,11 +45,11 @@ def brightest(crop):
         return first, first + line[first:].clip(0, 1).sum()
 
     (x0, width_end), (y0, height_end) = sides(columns), sides(rows)
-    return Raw(np.array([[x0, y0, width_end, height_end]], float), np.array([0.9]), np.array([0]))
+    return Candidates(np.array([[x0, y0, width_end, height_end]], float), np.array([0.9]), np.array([0]))
 
 
 def nothing(crops):
-    return [Raw(np.empty((0, 4)), np.empty(0), np.empty(0, np.int64)) for _ in crops]
+    return [Candidates(np.empty((0, 4)), np.empty(0), np.empty(0, np.int64)) for _ in crops]
 
 
 @settings(deadline=None, max_examples=40)

@@ -1,4 +1,4 @@
-"""What can be wrong with a detector: one clear line each."""
+"""Errors of a detector; each message is one line."""
 
 
 class DetectorError(ValueError):
@@ -6,15 +6,15 @@ class DetectorError(ValueError):
 
 
 class ModelFileError(DetectorError):
-    """A model file that is missing, truncated, no ONNX, or needs operators that are not here."""
+    """A model file that is missing, truncated, not ONNX, or needs operators that onnxruntime lacks."""
 
 
 class ModelLayoutError(DetectorError):
-    """A model whose inputs or outputs are none of the layouts known, or could be several."""
+    """A model whose inputs or outputs are none of the registered layouts, or could be several."""
 
 
 class ModelClassError(DetectorError):
-    """Classes asked for that the model does not have."""
+    """A class that the parameters name and the model does not have."""
 
 
 class DetectorImageError(DetectorError):

@@ -1,4 +1,4 @@
-"""Which of several objects is the target: the one it was, as long as it is seen; else the best one in view."""
+"""Which of several objects is the target: the same one as before while it is seen, else the best one in view."""
 
 import math
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ import numpy as np
 from vergence_metric.boxes.association import Association, BoxPair, Expected
 from vergence_metric.boxes.detections import Box
 from vergence_metric.boxes.pair_geometry import PairGeometry, Pixel
-from vergence_metric.boxes.parameters import BoxMetricParameters
+from vergence_metric.boxes.parameters import FollowParameters
 
 _OFF_CENTER_COST = 0.3  # of score, from the image's middle to its border
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The target in this pair of images: a pair, or the box of the one eye that sees it, or neither."""
+    """The target in this pair of images: a pair, or the box of the one eye that sees it, or none."""
 
     pair: BoxPair | None = None
     left: Box | None = None
@@ -24,7 +24,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Where the target was: its class, and its place in each eye, as a direction in rig_base where eyes are known."""
+    """Where the target was: its class, its place in each image, and its direction in rig_base if angles are known."""
 
     class_id: int
     places: tuple[Pixel | None, Pixel | None]
@@ -33,9 +33,9 @@ class _Seen:
 
 
 class TargetMemory:
-    """Remembers the target's directions, so that the eyes may turn under it."""
+    """Keeps the target's last place as directions in rig_base, which turning eyes do not change."""
 
-    def __init__(self, parameters: BoxMetricParameters) -> None:
+    def __init__(self, parameters: FollowParameters) -> None:
         self.parameters = parameters
         self._seen: _Seen | None = None
 
@@ -52,9 +52,9 @@ class TargetMemory:
         return choice
 
     def expected(self, stamp_s: float, geometry: PairGeometry | None) -> Expected | None:
-        """Return where the target should be seen now if it rests in the world; None where it is forgotten."""
+        """Return where the target should be now if it rests in the world; None without a recent one."""
         seen = self._seen
-        if seen is None or not 0.0 <= stamp_s - seen.stamp_s <= self.parameters.forget_s:
+        if seen is None or not 0.0 <= stamp_s - seen.stamp_s <= self.parameters.forget_after_s:
             return None
         places = []
         for eye, (place, direction) in enumerate(zip(seen.places, seen.directions, strict=True)):
@@ -62,10 +62,10 @@ class TargetMemory:
                 moved = geometry.pixel(eye == 0, direction)
                 place = moved if math.isfinite(moved[0]) else None
             places.append(place)
-        return Expected(seen.class_id, places[0], places[1])
+        return Expected(seen.class_id, places[0], places[1], self.parameters.gate_px)
 
     def _same(self, found: Association, expected: Expected) -> Choice:
-        gate, class_id = self.parameters.follow_gate_px, expected.class_id
+        gate, class_id = expected.gate_px, expected.class_id
 
         def off(boxes: tuple[Box | None, Box | None]) -> float:
             distances = [
@@ -85,10 +85,10 @@ class TargetMemory:
         left = choice.pair.left if choice.pair else choice.left
         right = choice.pair.right if choice.pair else choice.right
         if choice.pair is not None and choice.pair.ambiguous:
-            right = None  # a guess must not become the past that settles the next one
+            right = None  # a guess must not decide the next pair
         shown = left or right
         if shown is None:
-            if self._seen is not None and not 0.0 <= stamp_s - self._seen.stamp_s <= self.parameters.forget_s:
+            if self._seen is not None and not 0.0 <= stamp_s - self._seen.stamp_s <= self.parameters.forget_after_s:
                 self._seen = None
             return
         boxes = (left, right)
@@ -101,15 +101,15 @@ class TargetMemory:
 
 
 def _best(found: Association, image_size_px: tuple[int, int]) -> Choice:
-    """Return the object with the best score, one near the middle before one at the border, a pair before a box."""
+    """Return the object with the best score less a cost of its distance from the middle; pairs come before boxes."""
     middle = (image_size_px[0] - 1) / 2, (image_size_px[1] - 1) / 2
 
-    def worth(*boxes: Box) -> float:
+    def value(*boxes: Box) -> float:
         off = max(math.dist(box.center_px, middle) for box in boxes) / math.hypot(*middle)
         return min(box.score for box in boxes) - _OFF_CENTER_COST * off
 
     if found.pairs:
-        return Choice(pair=max(found.pairs, key=lambda pair: worth(pair.left, pair.right)))
-    single = [(worth(box), Choice(left=box)) for box in found.left_only]
-    single += [(worth(box), Choice(right=box)) for box in found.right_only]
+        return Choice(pair=max(found.pairs, key=lambda pair: value(pair.left, pair.right)))
+    single = [(value(box), Choice(left=box)) for box in found.left_only]
+    single += [(value(box), Choice(right=box)) for box in found.right_only]
     return max(single, key=lambda item: item[0])[1] if single else Choice()

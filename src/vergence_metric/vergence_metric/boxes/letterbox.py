@@ -3,7 +3,6 @@
 Detectors count from the outer corner of the top-left pixel; the rest of this package from its centre, half a pixel off.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,8 @@ from numpy.typing import NDArray
 RESIZES = ("letterbox", "stretch", "corner")
 """With borders all round (YOLOv5 to 11), without borders, or with borders right and below (YOLOX)."""
 
-_GREY = 114
+BORDER_GREY = 114
+"""Of what lies beyond the image in the network's input."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Letterbox:
             fitted = np.asarray(cv2.resize(image, self.fitted_px, interpolation=cv2.INTER_LINEAR))
         if self.fitted_px == self.input_px:
             return fitted
-        picture = np.full((self.input_px[1], self.input_px[0], 3), _GREY, np.uint8)
+        picture = np.full((self.input_px[1], self.input_px[0], 3), BORDER_GREY, np.uint8)
         (left, top), (width, height) = self.offset_px, self.fitted_px
         picture[top : top + height, left : left + width] = fitted
         return picture
@@ -68,25 +68,3 @@ class Letterbox:
         """Return boxes (N, 4) in the input's pixels from boxes in raw pixels of the source."""
         boxes = np.asarray(xyxy_px, np.float64).reshape(-1, 4)
         return (boxes + 0.5) * (self.scale * 2) + self.offset_px * 2
-
-
-def blob(
-    pictures: NDArray[np.uint8] | Sequence[NDArray[np.uint8]],
-    color: str,
-    unit_scale: bool,
-    dtype: type[np.floating[Any]],
-) -> NDArray[Any]:
-    """Return the input tensor (B, 3, h, w) of BGR pictures (h, w, 3), one or B of one size.
-
-    `color` is rgb or bgr; values are 0..1 or 0..255.
-    """
-    several = [pictures] if isinstance(pictures, np.ndarray) else pictures
-    tensor = np.empty((len(several), 3, *several[0].shape[:2]), dtype)
-    # Plane by plane: converting the interleaved picture as a whole takes five times as long.
-    for planes, picture in zip(tensor, several, strict=True):
-        for plane, channel in zip(planes[:: -1 if color == "rgb" else 1], cv2.split(picture), strict=True):
-            if unit_scale:
-                np.multiply(channel, dtype(1.0 / 255.0), out=plane)
-            else:
-                plane[:] = channel
-    return tensor

@@ -1,4 +1,4 @@
-"""Metric II of pair after pair: detect, pair, choose the target, measure, refine, smooth, place in space."""
+"""Metric II of pair after pair: detect, associate, choose the target, smooth, measure, refine, triangulate."""
 
 import math
 from dataclasses import replace
@@ -16,47 +16,51 @@ from vergence_metric.boxes.detector import Detector
 from vergence_metric.boxes.errors import DetectorImageError
 from vergence_metric.boxes.following import Choice, TargetMemory
 from vergence_metric.boxes.pair_geometry import PairGeometry
-from vergence_metric.boxes.parameters import BoxMetricNodeParameters
+from vergence_metric.boxes.parameters import BoxMetricParameters
 from vergence_metric.boxes.refinement import refine
 from vergence_metric.boxes.result import NAN2, UNREFINED, BoxStatus, BoxVergenceResult
 from vergence_metric.boxes.smoothing import LagLimitedFilter
 from vergence_metric.boxes.target_point import TargetPoint, locate
 from vergence_metric.boxes.uncertainty import direction_sigma_px, disparity_sigma_px
-from vergence_metric.pairs.viewing_angles import angular_disparity
+from vergence_metric.disparity.angular_disparity import angular_disparity
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 
 Models = tuple[CameraModel, CameraModel]
 
 JOINT_SIGMA_RAD = 0.004
-"""Of one joint without feedback: a dead band of 0.75 degree, evenly spread."""
+"""Standard deviation of the angle of a joint without feedback: a dead band of 0.75 degree, evenly spread."""
 
 _VERTICAL_WEIGHT = 0.05
 _LARGEST_VERTICAL_PX = 40.0
 
 
 class BoxMeasurement:
-    """Measures pairs in order of their stamps; remembers the target and the mounts' vertical offset."""
+    """Measures pairs in order of their stamps; keeps the target and the mounts' vertical offset between them."""
 
     def __init__(
-        self, parameters: BoxMetricNodeParameters, baseline_m: float, detector: Detector | None = None
+        self,
+        parameters: BoxMetricParameters,
+        baseline_m: float,
+        detector: Detector | None = None,
+        threads: int = 1,
     ) -> None:
-        """Load the detector that the parameters name, unless one is given; raises its errors."""
-        self.detector = detector or Detector(parameters, parameters.threads)
+        """Load the detector that the parameters name, on `threads` threads, unless one is given; raises its errors."""
+        self.detector = detector or Detector(parameters.detector, threads)
         self._baseline_m = baseline_m
-        self._memory = TargetMemory(parameters)
+        self._memory = TargetMemory(parameters.follow)
         self._vertical_px, self._vertical_count = 0.0, 0
         self._parameters = parameters
-        self._filter = LagLimitedFilter(parameters.smoothing_lag_s)
+        self._filter = LagLimitedFilter(parameters.measurement.smoothing_lag_s)
 
-    def set_parameters(self, parameters: BoxMetricNodeParameters) -> None:
-        """Take changed parameters; raises ModelClassError for classes the model does not have."""
+    def set_parameters(self, parameters: BoxMetricParameters) -> None:
+        """Apply changed parameters; raises ModelClassError for classes the model does not have."""
         if parameters == self._parameters:
             return
-        self.detector.set_parameters(parameters)
-        self._memory.parameters = parameters
-        if parameters.smoothing_lag_s != self._parameters.smoothing_lag_s:
-            self._filter = LagLimitedFilter(parameters.smoothing_lag_s)
+        self.detector.set_parameters(parameters.detector)
+        self._memory.parameters = parameters.follow
+        if parameters.measurement.smoothing_lag_s != self._parameters.measurement.smoothing_lag_s:
+            self._filter = LagLimitedFilter(parameters.measurement.smoothing_lag_s)
         self._parameters = parameters
 
     def measure(
@@ -72,21 +76,23 @@ class BoxMeasurement:
         Args:
             left: (h, w, 3) BGR or (h, w) grey uint8 of the left eye.
             right: of the right eye, of the same size.
-            stamp_s: of the left image; a stamp that goes back forgets the target.
-            eyes: joint angles at the images' stamps, None if they are not known.
-            models: both cameras, None if they are not known.
+            stamp_s: of the left image; a stamp that goes back drops the target.
+            eyes: joint angles at the images' stamps, None if unknown.
+            models: both cameras, None if unknown.
 
         Raises:
             DetectorImageError: images that are not of one size, or no images.
 
         """
         if left.shape[:2] != right.shape[:2]:
-            raise DetectorImageError(f"right image is {right.shape[:2]}: allowed is the left one's {left.shape[:2]}")
-        return self.relate(
+            raise DetectorImageError(
+                f"right image must be of the left one's size {left.shape[:2]}: got {right.shape[:2]}"
+            )
+        return self.measure_detections(
             (left, right), (self.detector.detect(left), self.detector.detect(right)), stamp_s, eyes, models
         )
 
-    def relate(
+    def measure_detections(
         self,
         images: tuple[NDArray[Any], NDArray[Any]],
         seen: tuple[Detections, Detections],
@@ -95,10 +101,17 @@ class BoxMeasurement:
         models: Models | None,
     ) -> BoxVergenceResult:
         """Return metric II of what was detected in a pair; see `measure`."""
-        p = self._parameters
         geometry = PairGeometry(*models, eyes) if models is not None and eyes is not None else None
         expected = self._memory.expected(stamp_s, geometry)
-        found = associate(seen[0].boxes(), seen[1].boxes(), p, self._vertical_px, images, geometry, expected)
+        found = associate(
+            seen[0].boxes(),
+            seen[1].boxes(),
+            self._parameters.association,
+            self._vertical_px,
+            images,
+            geometry,
+            expected,
+        )
         choice = self._memory.choose(found, stamp_s, seen[0].image_size_px, geometry)
         if choice.pair is None:
             self._filter.reset()
@@ -110,7 +123,7 @@ class BoxMeasurement:
                 only_left,
                 right=choice.pair.right,
                 status=BoxStatus.AMBIGUOUS,
-                reason="another box of this class fits about as well",
+                reason="another box of this class fits the target's about as well",
             )
         return self._paired(choice.pair, images, seen, stamp_s, geometry, models)
 
@@ -142,13 +155,13 @@ class BoxMeasurement:
         geometry: PairGeometry | None,
         models: Models | None,
     ) -> BoxVergenceResult:
-        p = self._parameters
+        p = self._parameters.measurement
         left, right = self._smoothed(pair, stamp_s)
         refined = refine(_grey(images[0]), _grey(images[1]), left, right) if p.refine else UNREFINED
         expected_vertical = self._vertical_px
         if geometry is not None:
             expected_vertical += geometry.vertical_px(left.center_px, right.center_px[0])
-        hidden = hidden_sides(left, right, p.occluded_ratio, refined.horizontal_px, expected_vertical)
+        hidden = hidden_sides(left, right, p.occlusion_ratio, refined.horizontal_px, expected_vertical)
         metric = corner_metric(left, right, hidden)
         status, reason = BoxStatus.OK, ""
         if left.is_cut or right.is_cut:
@@ -156,7 +169,7 @@ class BoxMeasurement:
         elif any(hidden):
             status, reason = BoxStatus.OCCLUDED, "the boxes' sizes disagree: partly hidden in one eye"
         else:
-            self._learn_vertical(float(metric.center_px[1]) - (expected_vertical - self._vertical_px))
+            self._update_vertical(float(metric.center_px[1]) - (expected_vertical - self._vertical_px))
         center_px, center_rad = _undistorted(models, left.center_px, (metric.center_px[0], metric.center_px[1]))
         surface_px, _ = _undistorted(models, left.center_px, (refined.horizontal_px, refined.vertical_px))
         source_per_input = seen[0].image_size_px[0] / self.detector.input_px[0]
@@ -201,7 +214,7 @@ class BoxMeasurement:
         )
 
     def _smoothed(self, pair: BoxPair, stamp_s: float) -> tuple[Box, Box]:
-        if self._parameters.smoothing_lag_s == 0.0:
+        if self._parameters.measurement.smoothing_lag_s == 0.0:
             return pair.left, pair.right
         sides = self._filter.update(stamp_s, np.array([*pair.left.xyxy_px, *pair.right.xyxy_px]))
         return (
@@ -209,28 +222,29 @@ class BoxMeasurement:
             replace(pair.right, xyxy_px=(float(sides[4]), float(sides[5]), float(sides[6]), float(sides[7]))),
         )
 
-    def _learn_vertical(self, offset_px: float) -> None:
-        """Take the mounts' vertical offset from sure pairs: the mean of the first ones, then slowly."""
+    def _update_vertical(self, offset_px: float) -> None:
+        """Update the mounts' vertical offset by a complete pair: the mean of the first ones, then a slow low pass."""
         if not math.isfinite(offset_px):
             return
         self._vertical_count += 1
         weight = max(_VERTICAL_WEIGHT, 1.0 / self._vertical_count)
-        learnt = self._vertical_px + weight * (offset_px - self._vertical_px)
-        self._vertical_px = min(max(learnt, -_LARGEST_VERTICAL_PX), _LARGEST_VERTICAL_PX)
+        updated = self._vertical_px + weight * (offset_px - self._vertical_px)
+        self._vertical_px = min(max(updated, -_LARGEST_VERTICAL_PX), _LARGEST_VERTICAL_PX)
 
 
 def measure_pair(
     left_bgr: NDArray[Any],
     right_bgr: NDArray[Any],
     model_path: str | Path = "",
-    parameters: BoxMetricNodeParameters | None = None,
+    parameters: BoxMetricParameters | None = None,
     models: Models | None = None,
 ) -> BoxVergenceResult:
     """Return metric II of one pair of images with the detector in `model_path` ("" for the shipped one).
 
     Raises DetectorError (a ValueError) with one clear line where the model or the images cannot be used.
     """
-    chosen = (parameters or BoxMetricNodeParameters()).replaced(model=str(model_path))
+    chosen = parameters or BoxMetricParameters()
+    chosen = replace(chosen, detector=chosen.detector.replaced(model=str(model_path)))
     return BoxMeasurement(chosen, baseline_m=math.nan).measure(left_bgr, right_bgr, models=models)
 
 

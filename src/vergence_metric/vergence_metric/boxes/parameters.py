@@ -1,167 +1,257 @@
-"""Parameters of the detector, of metric II and of box_metric_node."""
+"""Parameters of the detector, of metric II and of box_metric_node, group by group."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from vergence_metric.pairs.stereo_parameters import StereoParameters
+from vergence_metric.boxes.layouts import AUTO, layout_names
+from vergence_metric.boxes.letterbox import RESIZES
+from vergence_metric.boxes.preprocessing import COLORS, SCALES
+from vergence_metric.boxes.session import DEVICES
+from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_rig.parameters import Groups, ParameterError, Parameters, parameter
 
-LAYOUTS = ("auto", "yolov6", "yolov6_end_to_end", "yolov6_ort", "yolov5", "yolov8", "yolov10", "yolox")
-DEVICES = ("cpu", "cuda", "tensorrt", "openvino", "coreml", "directml")
-STRIDE_LIMIT_PX = 4096
+_LARGEST_INPUT_PX = 4096
+
+
+def _layout_choices() -> tuple[str, ...]:
+    return (AUTO, *layout_names())
 
 
 @dataclass(frozen=True)
 class DetectorParameters(Parameters):
-    """Which model finds things, and what is done to its input and output."""
+    """Which model detects objects, and what is done to its input and output."""
 
     model: str = parameter(
-        "", "path of an ONNX detector; empty for the one that ships with the package, for Rubik's cubes", read_only=True
+        "",
+        "path of the detector's ONNX file; empty for the one that ships with the package, which detects Rubik's cubes",
+        read_only=True,
+        formerly="model",
     )
-    device: str = parameter("cpu", "where onnxruntime runs it", choices=DEVICES, read_only=True)
+    device: str = parameter(
+        "cpu", "device on which onnxruntime runs the detector", choices=DEVICES, read_only=True, formerly="device"
+    )
     threshold: float = parameter(
         0.0,
-        "objects with a lower score are left out; 0 for what the model says, else 0.35; an export with suppression "
-        "inside has its own threshold besides",
+        "least score of an object; 0 takes the one in the model's metadata, else 0.35. An export with suppression "
+        "inside has its own threshold, which this one can only raise",
         minimum=0.0,
         maximum=1.0,
+        formerly="threshold",
     )
-    iou: float = parameter(
-        0.45, "of two boxes of a class that overlap by more the weaker goes", minimum=0.0, maximum=1.0
+    iou_threshold: float = parameter(
+        0.45,
+        "IoU threshold of non-maximum suppression: of two boxes of one class that overlap by more, the one with the "
+        "lower score is dropped",
+        minimum=0.0,
+        maximum=1.0,
+        formerly="iou",
     )
-    max_det: int = parameter(20, "most objects of one image", minimum=1, maximum=3000)
-    classes: tuple[str, ...] = parameter((), "names or numbers of the classes that count; empty for all")
-    imgsz_height: int = parameter(
+    max_objects: int = parameter(
+        20,
+        "most objects that are kept of one image, the best scores first",
+        minimum=1,
+        maximum=3000,
+        formerly="max_det",
+    )
+    classes: tuple[str, ...] = parameter(
+        (), "names or numbers of the classes that are detected; empty for all", formerly="classes"
+    )
+    input_height_px: int = parameter(
         0,
-        "height of the network's input; 0 for what the model says; a fixed input size of the model goes before",
+        "height of the network's input; 0 takes the one in the model's metadata, else 640. A model with a fixed input "
+        "size keeps that",
         unit="px",
         minimum=0,
-        maximum=STRIDE_LIMIT_PX,
+        maximum=_LARGEST_INPUT_PX,
         read_only=True,
+        formerly="imgsz_height",
     )
-    imgsz_width: int = parameter(
+    input_width_px: int = parameter(
         0,
-        "width of the network's input, like imgsz_height",
+        "width of the network's input; 0 takes the one in the model's metadata, else 640. A model with a fixed input "
+        "size keeps that",
         unit="px",
         minimum=0,
-        maximum=STRIDE_LIMIT_PX,
+        maximum=_LARGEST_INPUT_PX,
         read_only=True,
+        formerly="imgsz_width",
     )
-    layout: str = parameter("auto", "how the model's output reads; auto finds out", choices=LAYOUTS, read_only=True)
+    layout: str = parameter(
+        AUTO,
+        "layout of the model's outputs; auto recognises it by a run at the start",
+        choices=_layout_choices,
+        read_only=True,
+        formerly="layout",
+    )
     color: str = parameter(
         "auto",
-        "order of the input's channels; auto is rgb, bgr for yolox",
-        choices=("auto", "rgb", "bgr"),
+        "order of the channels of the network's input; auto takes the layout's own, rgb for most",
+        choices=("auto", *COLORS),
         read_only=True,
+        formerly="color",
     )
     scale: str = parameter(
         "auto",
-        "range of the input: unit is 0..1, byte 0..255; auto is unit, byte for yolox",
-        choices=("auto", "unit", "byte"),
+        "range of the network's input: unit is 0 to 1, byte 0 to 255; auto takes the layout's own, unit for most",
+        choices=("auto", *SCALES),
         read_only=True,
+        formerly="scale",
     )
     resize: str = parameter(
         "auto",
-        "how an image becomes the input: letterbox centres it, corner puts it top left, stretch fills the input; auto "
-        "is letterbox, corner for yolox",
-        choices=("auto", "letterbox", "corner", "stretch"),
+        "how an image is fitted into the network's input: letterbox centres it between borders, corner puts it top "
+        "left, stretch fills the input; auto takes the layout's own, letterbox for most",
+        choices=("auto", *RESIZES),
         read_only=True,
+        formerly="resize",
     )
-
     second_look: bool = parameter(
         True,
-        "look at each box again on a crop of the full image, for finer sides and a surer score; models with a fixed "
-        "input size or suppression inside look once",
+        "run the network a second time on a crop of the full image about each of the best boxes, for more accurate "
+        "sides and scores; a model with a fixed input size or with suppression inside runs once only",
+        formerly="second_look",
     )
 
     def check(self) -> None:
         """Raise ParameterError where only one side of the input is given."""
         super().check()
-        if (self.imgsz_height == 0) != (self.imgsz_width == 0):
-            raise ParameterError(
-                "imgsz_height", self.imgsz_height, f"0 if imgsz_width is 0, else at least 1 (it is {self.imgsz_width})"
-            )
+        if (self.input_height_px == 0) != (self.input_width_px == 0):
+            both = f"0 if input_width_px is 0, else at least 1 (input_width_px is {self.input_width_px})"
+            raise ParameterError("input_height_px", self.input_height_px, both)
 
 
 @dataclass(frozen=True)
-class BoxMetricParameters(Parameters):
-    """How the target's two boxes are chosen, measured and smoothed."""
+class AssociationParameters(Parameters):
+    """Which box of the right image can be the same object as a box of the left one."""
 
-    pair_vertical_px: float = parameter(
+    max_vertical_px: float = parameter(
         12.0,
-        "boxes of one object lie within this of the same row, besides the vertical offset learnt from earlier pairs",
+        "largest distance of one object's two boxes from the epipolar line, beside the vertical offset of the mounts, "
+        "which is estimated from earlier pairs",
         unit="px",
         minimum=1.0,
         maximum=200.0,
+        formerly="pair_vertical_px",
     )
-    pair_size_ratio: float = parameter(
-        1.6, "one object's two boxes differ in height by no more than this factor", minimum=1.05, maximum=5.0
+    max_height_ratio: float = parameter(
+        1.6,
+        "largest ratio of the heights of one object's two boxes",
+        minimum=1.05,
+        maximum=5.0,
+        formerly="pair_size_ratio",
     )
-    pair_disparity_px: float = parameter(
-        320.0, "largest disparity of one object, either way", unit="px", minimum=10.0, maximum=4000.0
+    max_disparity_px: float = parameter(
+        320.0,
+        "largest disparity of one object, positive or negative",
+        unit="px",
+        minimum=10.0,
+        maximum=4000.0,
+        formerly="pair_disparity_px",
     )
-    pair_misfit: float = parameter(
+    max_cost: float = parameter(
         24.0,
-        "boxes that fit worse than this in place, size, score and looks are not one object's "
-        "[standard deviations squared, summed]",
+        "largest cost of a pair of boxes, the sum of squared deviations in place, size, score and appearance; boxes "
+        "with a larger one are not paired",
+        unit="standard deviations squared",
         minimum=1.0,
         maximum=1000.0,
+        formerly="pair_misfit",
     )
-    pair_margin: float = parameter(
+    min_margin: float = parameter(
         1.5,
-        "the best pair must be better than one that shares a box with it by this [standard deviations squared]",
+        "least difference of cost between a pair and the next best one that shares a box with it; with less the pair "
+        "is ambiguous",
+        unit="standard deviations squared",
         minimum=0.0,
         maximum=50.0,
+        formerly="pair_margin",
     )
-    follow_gate_px: float = parameter(
-        60.0,
-        "the target is taken for the same if it moved less than this between pairs",
-        unit="px",
-        minimum=1.0,
-        maximum=1000.0,
-    )
-    forget_s: float = parameter(
-        1.0, "the target is forgotten when unseen for this", unit="s", minimum=0.0, maximum=60.0
-    )
-    occluded_ratio: float = parameter(
-        1.25,
-        "a pair whose widths or heights differ by more than this factor is partly hidden in one eye",
-        minimum=1.02,
-        maximum=3.0,
-    )
-    smoothing_lag_s: float = parameter(
-        0.0,
-        "lag that smoothing of the boxes may add to a steady motion; 0 is no smoothing",
-        unit="s",
-        minimum=0.0,
-        maximum=1.0,
-    )
-    refine: bool = parameter(True, "measure the surface's disparity inside the pair of boxes too")
 
 
 @dataclass(frozen=True)
-class BoxMetricNodeParameters(BoxMetricParameters, DetectorParameters, StereoParameters):
-    """Everything box_metric_node can be told; defaults equal config/box_metric_node.yaml."""
+class FollowParameters(Parameters):
+    """How the target is recognised from one pair of images to the next."""
 
-    enable: bool = parameter(True, "whether pairs are measured at all")
+    gate_px: float = parameter(
+        60.0,
+        "largest distance from the target's expected place at which an object still counts as the target",
+        unit="px",
+        minimum=1.0,
+        maximum=1000.0,
+        formerly="follow_gate_px",
+    )
+    forget_after_s: float = parameter(
+        1.0,
+        "a target that is not seen for this long is given up, and the best object near the image's middle becomes the "
+        "target",
+        unit="s",
+        minimum=0.0,
+        maximum=60.0,
+        formerly="forget_s",
+    )
+
+
+@dataclass(frozen=True)
+class BoxMeasurementParameters(Parameters):
+    """How the target's pair of boxes is measured."""
+
+    occlusion_ratio: float = parameter(
+        1.25,
+        "ratio of widths or of heights of the target's two boxes above which it counts as partly hidden in one eye",
+        minimum=1.02,
+        maximum=3.0,
+        formerly="occluded_ratio",
+    )
+    smoothing_lag_s: float = parameter(
+        0.0,
+        "time by which smoothed boxes lag behind a steady motion; 0 does not smooth",
+        unit="s",
+        minimum=0.0,
+        maximum=1.0,
+        formerly="smoothing_lag_s",
+    )
+    refine: bool = parameter(
+        True,
+        "measure, beside the disparity of the boxes' centres, the mean disparity of the surface inside the boxes",
+        formerly="refine",
+    )
+
+
+@dataclass(frozen=True)
+class BoxMetricParameters:
+    """All parameters that metric II of a pair of images depends on."""
+
+    detector: DetectorParameters = field(default_factory=DetectorParameters)
+    association: AssociationParameters = field(default_factory=AssociationParameters)
+    follow: FollowParameters = field(default_factory=FollowParameters)
+    measurement: BoxMeasurementParameters = field(default_factory=BoxMeasurementParameters)
+
+
+@dataclass(frozen=True)
+class BoxMetricNodeParameters(StereoParameters):
+    """When box_metric_node measures, and where its images come from."""
+
+    enable: bool = parameter(True, "measure pairs; false stops detection and frees its processor time")
     rate_hz: float = parameter(
         10.5,
-        "pairs measured a second at most, so that the rest of the graph keeps its cores",
+        "most pairs that are measured per second; the rest of the processor time is left to other nodes",
         unit="Hz",
         minimum=0.1,
         maximum=240.0,
     )
     niceness: int = parameter(
         15,
-        "how far detection gives way to other nodes that want the same core, as nice(1) means it",
+        "niceness of the measuring thread, as of nice(1): with a higher value other nodes on the same core go first",
         minimum=0,
         maximum=19,
         read_only=True,
     )
 
-    def check(self) -> None:
-        """Hold every part to its own rules."""
-        for part in (BoxMetricParameters, DetectorParameters, StereoParameters):
-            part.check(self)
 
-
-GROUPS: Groups = (("", BoxMetricNodeParameters),)
+GROUPS: Groups = (
+    ("", BoxMetricNodeParameters),
+    ("pair.", PairingParameters),
+    ("detector.", DetectorParameters),
+    ("association.", AssociationParameters),
+    ("follow.", FollowParameters),
+    ("measurement.", BoxMeasurementParameters),
+)

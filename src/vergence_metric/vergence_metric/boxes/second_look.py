@@ -1,4 +1,8 @@
-"""A second look: the same network on a crop of the full image about each box, for finer sides and a surer score."""
+"""A second look: the same network on a crop of the full image about each box, for finer sides and a better score.
+
+In the first run the image is shrunk to the network's input, and a small object is a few pixels there. In the second run
+the input shows the object alone, larger.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,19 +12,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.boxes.decoding import Raw
+from vergence_metric.boxes.layouts import Candidates
+from vergence_metric.boxes.letterbox import BORDER_GREY
 
 MOST_LOOKS = 4
-"""Boxes of an image that are looked at again; weaker ones stay as they are."""
+"""Boxes of an image that get a second look, the best ones; the others stay as they are."""
 
 CROP_PX = (96, 96)
 """Of the crop as the network sees it (width, height): whole strides, an eighth of the usual input."""
 
 _CROP_SHARE = 1.5  # of the box's sides
-_LARGEST_ZOOM = 3.3  # beyond, there is nothing finer to see
+_LARGEST_ZOOM = 3.3  # a larger one shows nothing finer
 _ANTIALIAS = 0.45
-_SAME = 0.4  # overlap of the two looks' boxes
-_GREY = 114
+_SAME_OBJECT_IOU = 0.4  # of the boxes of both looks
 
 
 @dataclass(frozen=True)
@@ -36,13 +40,13 @@ class Window:
     def about(
         cls, xyxy: NDArray[np.float64], image_px: tuple[int, int], size_px: tuple[int, int] = CROP_PX
     ) -> "Window":
-        """Return the window of a closer look at a box (4,) in raw pixels of an image of (width, height)."""
+        """Return the window about a box (4,) in raw pixels of an image of (width, height)."""
         size = xyxy[2:] - xyxy[:2]
         scale = max(float((_CROP_SHARE * size / size_px).max()), 1.0 / _LARGEST_ZOOM)
         covered = scale * np.array(size_px)
         room = np.array(image_px) - covered
         corner = 0.5 * (xyxy[:2] + xyxy[2:]) + 0.5 - 0.5 * covered
-        # Within the image, as far as that is possible: what lies beyond it tells nothing.
+        # Within the image, as far as that is possible: pixels beyond it hold no information.
         corner = np.where(room >= 0, np.clip(corner, 0, np.maximum(room, 0)), 0.5 * room)
         return cls(float(corner[0]), float(corner[1]), scale, size_px)
 
@@ -68,7 +72,7 @@ class Window:
                 self.size_px,
                 flags=flags,
                 borderMode=cv2.BORDER_CONSTANT,
-                borderValue=(_GREY, _GREY, _GREY),
+                borderValue=(BORDER_GREY, BORDER_GREY, BORDER_GREY),
             ),
             np.uint8,
         )
@@ -84,12 +88,12 @@ def look_again(
     scores: NDArray[np.float64],
     class_ids: NDArray[np.int64],
     first_scale: float,
-    see: Callable[[list[NDArray[np.uint8]]], Sequence[Raw]],
+    detect: Callable[[list[NDArray[np.uint8]]], Sequence[Candidates]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return boxes (N, 4) and scores (N,) after a closer look at the best ones.
+    """Return boxes (N, 4) and scores (N,) after a second look at the best ones.
 
-    A box's score is the mean of both looks', 0 for a closer one that does not see it with its class. Its sides are
-    their mean, weighted as if each look erred by the same share of its own pixels.
+    A box's score becomes the mean over both looks; a second look that does not find it with its class counts as 0. Its
+    sides become their mean, weighted as if each look erred by the same share of its own pixels.
 
     Args:
         image: (h, w, 3) BGR.
@@ -97,22 +101,22 @@ def look_again(
         scores: theirs.
         class_ids: theirs.
         first_scale: image pixels per pixel of the first look.
-        see: what the network finds in each of several pictures of CROP_PX: all candidates, down to low scores.
+        detect: returns for each of several pictures of CROP_PX all candidates, down to low scores.
 
     """
-    boxes, sure = xyxy_px.copy(), scores.copy()
+    boxes, means = xyxy_px.copy(), scores.copy()
     windows = [Window.about(box, (image.shape[1], image.shape[0])) for box in xyxy_px[:MOST_LOOKS]]
-    found = see([window.of(image) for window in windows]) if windows else []
-    for i, (window, raw) in enumerate(zip(windows, found, strict=True)):
-        seen = window.to_image(raw.xyxy)
-        same = (_overlaps(seen, xyxy_px[i]) >= _SAME) & (raw.class_ids == class_ids[i])
-        sure[i] = 0.5 * scores[i]
+    found = detect([window.of(image) for window in windows]) if windows else []
+    for i, (window, candidates) in enumerate(zip(windows, found, strict=True)):
+        again = window.to_image(candidates.xyxy)
+        same = (_overlaps(again, xyxy_px[i]) >= _SAME_OBJECT_IOU) & (candidates.class_ids == class_ids[i])
+        means[i] = 0.5 * scores[i]
         if same.any():
-            best = int(np.flatnonzero(same)[raw.scores[same].argmax()])
-            sure[i] += 0.5 * float(raw.scores[best])
+            best = int(np.flatnonzero(same)[candidates.scores[same].argmax()])
+            means[i] += 0.5 * float(candidates.scores[best])
             share = first_scale**2 / (first_scale**2 + window.scale**2)
-            boxes[i] = (1.0 - share) * xyxy_px[i] + share * seen[best]
-    return boxes, sure
+            boxes[i] = (1.0 - share) * xyxy_px[i] + share * again[best]
+    return boxes, means
 
 
 def _overlaps(boxes: NDArray[np.float64], box: NDArray[np.float64]) -> NDArray[Any]:

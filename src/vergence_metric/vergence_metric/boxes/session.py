@@ -1,4 +1,4 @@
-"""An ONNX model in onnxruntime: loaded with clear errors, its input understood, its own words read."""
+"""An ONNX model in onnxruntime: loaded with clear errors, its input checked, its metadata read."""
 
 import ast
 import json
@@ -21,6 +21,9 @@ _PROVIDERS = {
     "coreml": "CoreMLExecutionProvider",
     "directml": "DmlExecutionProvider",
 }
+DEVICES = tuple(_PROVIDERS)
+"""What the parameter `detector.device` may be."""
+
 _TYPES: dict[str, Any] = {
     "tensor(float)": np.float32,
     "tensor(float16)": np.float16,
@@ -51,8 +54,8 @@ class ModelSession:
             threads: that an operator may use; 0 leaves it to onnxruntime.
 
         Raises:
-            ModelFileError: the file is missing, truncated, no ONNX, or needs operators that are not here.
-            ModelLayoutError: its input is no picture.
+            ModelFileError: the file is missing, truncated, not ONNX, or needs operators that onnxruntime lacks.
+            ModelLayoutError: its input is not a picture.
 
         """
         self.path = Path(path).expanduser() if str(path) else SHIPPED_MODEL
@@ -66,7 +69,7 @@ class ModelSession:
         available = onnxruntime.get_available_providers()
         if provider not in available:
             here = ", ".join(name for name, p in _PROVIDERS.items() if p in available)
-            raise DetectorError(f"device is {device!r}: this onnxruntime has {here}")
+            raise DetectorError(f"device must be one that this onnxruntime has ({here}): got {device!r}")
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
         # Threads that spin while they wait would take the cores of other nodes.
@@ -90,7 +93,7 @@ class ModelSession:
         return [np.asarray(output) for output in outputs]
 
     def class_names(self) -> tuple[str, ...]:
-        """Return the classes' names as the file tells them; empty if it does not."""
+        """Return the classes' names in the metadata; empty if there are none."""
         text = self.metadata.get("names", "")
         for parse in (json.loads, ast.literal_eval):
             try:
@@ -108,16 +111,16 @@ class ModelSession:
         text = self.metadata.get("stride", "32")
         return int(float(text)) if text.replace(".", "", 1).isdigit() and float(text) >= 1 else 32
 
-    def own_threshold(self) -> float | None:
-        """Return the score that the file says objects should have, None if it does not."""
+    def metadata_threshold(self) -> float | None:
+        """Return the least score of an object in the metadata, None if there is none."""
         try:
             value = float(self.metadata.get("threshold", ""))
         except ValueError:
             return None
         return value if 0.0 < value < 1.0 else None
 
-    def own_size_px(self) -> tuple[int, int] | None:
-        """Return (width, height) that the file says it was made for, None if it does not."""
+    def metadata_input_px(self) -> tuple[int, int] | None:
+        """Return the input's (width, height) [px] in the metadata, None if there is none."""
         try:
             height, width = json.loads(self.metadata.get("imgsz", ""))
         except (ValueError, TypeError):
@@ -128,16 +131,18 @@ class ModelSession:
         inputs = self._session.get_inputs()
         if len(inputs) != 1:
             names = ", ".join(spec.name for spec in inputs)
-            raise ModelLayoutError(f"model {self.path}: it has {len(inputs)} inputs ({names}): allowed is one picture")
+            raise ModelLayoutError(
+                f"model {self.path}: its input must be one picture: got {len(inputs)} inputs ({names})"
+            )
         spec, shape = inputs[0], list(inputs[0].shape)
         batch, channels = (shape[0], shape[1]) if len(shape) == 4 else (None, None)
         if len(shape) != 4 or (isinstance(channels, int) and channels != 3) or spec.type not in _TYPES:
             raise ModelLayoutError(
-                f"model {self.path}: its input '{spec.name}' is {spec.type} {shape}: allowed is (1, 3, height, width) "
-                "of float, half, double or uint8"
+                f"model {self.path}: its input '{spec.name}' must be (1, 3, height, width) of float, half, double or "
+                f"uint8: got {spec.type} {shape}"
             )
         if isinstance(batch, int) and batch != 1:
-            raise ModelLayoutError(f"model {self.path}: its batch size is {batch}: allowed is 1 or a dynamic one")
+            raise ModelLayoutError(f"model {self.path}: its batch size must be 1 or dynamic: got {batch}")
         sides = [side if isinstance(side, int) and side > 0 else None for side in shape[2:]]
         return InputSpec(spec.name, _TYPES[spec.type], sides[0], sides[1])
 
@@ -151,7 +156,7 @@ def _reason(error: Exception) -> str:
                 "suppression, or for onnxruntime"
             )
     if any(word in text for word in ("InvalidProtobuf", "INVALID_PROTOBUF", "Protobuf parsing failed", "ModelProto")):
-        return "it is no whole ONNX model (truncated, or another kind of file)"
+        return "it is not a complete ONNX model (truncated, or another kind of file)"
     if "is not a registered function/op" in text or "NOT_IMPLEMENTED" in text:
         return f"it needs an operator that this onnxruntime does not have: {text}"
     return f"onnxruntime cannot load it: {text}"

@@ -16,8 +16,17 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_metric.boxes import BoxMeasurement, BoxVergenceResult, DetectorError, draw
-from vergence_metric.boxes.parameters import GROUPS, BoxMetricNodeParameters
+from vergence_metric.boxes.parameters import (
+    GROUPS,
+    AssociationParameters,
+    BoxMeasurementParameters,
+    BoxMetricNodeParameters,
+    BoxMetricParameters,
+    DetectorParameters,
+    FollowParameters,
+)
 from vergence_metric.pairs.latest_worker import LatestWorker
+from vergence_metric.pairs.parameters import PairingParameters
 from vergence_metric.ros.box_messages import (
     box_vergence_message,
     detections_message,
@@ -25,15 +34,15 @@ from vergence_metric.ros.box_messages import (
     vision_message,
     vision_type,
 )
-from vergence_metric.ros.pair_node import PairNode
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
+from vergence_metric.ros.stereo_node import StereoNode
 from vergence_msgs.msg import BoxVergence, StereoDetections
 from vergence_rig.rig import load_rig
 
 EYES = ("left", "right")
 
 
-class BoxMetricNode(PairNode):
+class BoxMetricNode(StereoNode):
     """Measures the newest pair, at most `rate_hz` times a second, on a thread of its own."""
 
     def __init__(self, **options: Any) -> None:
@@ -42,7 +51,8 @@ class BoxMetricNode(PairNode):
         settings: BoxMetricNodeParameters = self._settings.value
         cv2.setNumThreads(settings.threads or -1)
         rig = load_rig(settings.rig)
-        self._measurement = BoxMeasurement(settings, rig.baseline_m)
+        self._metric_parameters = _parameters_of(self._settings)
+        self._measurement = BoxMeasurement(self._metric_parameters, rig.baseline_m, threads=settings.threads)
         self.get_logger().info(self._measurement.detector.describe())
         self._counts: dict[str, int] = {}
         self._due_ns = 0
@@ -59,14 +69,15 @@ class BoxMetricNode(PairNode):
         self._worker: LatestWorker[ImagePair] = LatestWorker(
             self._measure, self._on_failure, "measure", settings.niceness
         )
-        self._stereo = StereoInput(self, settings, diagnostics, qos, self._on_pair)
+        pairing = self._settings.get(PairingParameters)
+        self._stereo = StereoInput(self, settings, pairing, diagnostics, qos, self._on_pair)
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self.add_on_set_parameters_callback(self._refuse_unknown_classes)
         self._settings.on_change(self._on_settings)
         diagnostics.add("detector", self._report)
 
     def _refuse_unknown_classes(self, changes: list[Parameter]) -> SetParametersResult:
-        wanted = next((tuple(c.value or ()) for c in changes if c.name == "classes"), ())
+        wanted = next((tuple(c.value or ()) for c in changes if c.name == "detector.classes"), ())
         try:
             self._measurement.detector.class_ids(wanted)
         except DetectorError as error:
@@ -75,7 +86,8 @@ class BoxMetricNode(PairNode):
 
     def _on_settings(self, settings: ParameterSet) -> None:
         cv2.setNumThreads(settings.value.threads or -1)
-        self._stereo.set_parameters(settings.value)
+        self._metric_parameters = _parameters_of(settings)
+        self._stereo.set_parameters(settings.value, settings.get(PairingParameters))
 
     def _on_pair(self, pair: ImagePair) -> None:
         settings: BoxMetricNodeParameters = self._settings.value
@@ -91,7 +103,7 @@ class BoxMetricNode(PairNode):
         self._worker.submit(pair)
 
     def _measure(self, pair: ImagePair) -> None:
-        self._measurement.set_parameters(self._settings.value)
+        self._measurement.set_parameters(self._metric_parameters)
         eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
         models = self._stereo.models_for(pair.left.pixels)
         with self._times.measure("metric"):
@@ -130,6 +142,15 @@ class BoxMetricNode(PairNode):
         if self._worker.dropped > self._worker.worked // 10:
             return Report(WARN, f"too slow for {self._settings.value.rate_hz:g} Hz", values)
         return Report(OK, f"{self._worker.worked} pairs measured", values)
+
+
+def _parameters_of(settings: ParameterSet) -> BoxMetricParameters:
+    return BoxMetricParameters(
+        settings.get(DetectorParameters),
+        settings.get(AssociationParameters),
+        settings.get(FollowParameters),
+        settings.get(BoxMeasurementParameters),
+    )
 
 
 def main(args: Sequence[str] | None = None) -> int:

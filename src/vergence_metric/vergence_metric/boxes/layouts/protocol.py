@@ -1,0 +1,114 @@
+"""What a detector layout is: how a network's input is prepared and its output read."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vergence_metric.boxes.preprocessing import Preprocessing
+
+Array = NDArray[np.float64]
+Output = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class WarmUp:
+    """The first run of a model, on a grey picture, from which its layout is recognised.
+
+    `output_names` and `outputs` are in the model's order, `input_px` is the (width, height) it was run with,
+    `metadata` the file's own entries, and `class_count` the number of class names among them, None if there are none.
+    Shapes declared in the file are not used: exporters get them wrong.
+    """
+
+    output_names: Sequence[str]
+    outputs: Sequence[Output]
+    input_px: tuple[int, int]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    class_count: int | None = None
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Possible objects of one image.
+
+    `xyxy` (K, 4) are corners [px of the input, counted from its outer corner], `scores` (K,), `class_ids` (K,).
+    """
+
+    xyxy: Array
+    scores: Array
+    class_ids: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Layout(ABC):
+    """One layout of a detector's outputs. Subclasses are frozen dataclasses; an instance belongs to one model.
+
+    `outputs` are the indices of the outputs that `decode` needs, in its order, `classes` is the number of classes,
+    None if neither shape nor metadata give it, and `strides` are the strides [px] of the grid, if there is one.
+    """
+
+    name: ClassVar[str]
+    """What the parameter `detector.layout` and the metadata entry `layout` select it by."""
+
+    description: ClassVar[str]
+    """Its outputs in a few words, for logs and errors."""
+
+    suppressed: ClassVar[bool] = False
+    """True if the model itself has removed overlapping boxes."""
+
+    certain: ClassVar[bool] = False
+    """True if a match cannot be another layout, because the outputs' names say so."""
+
+    outputs: tuple[int, ...]
+    classes: int | None
+    strides: tuple[int, ...] = ()
+
+    @classmethod
+    @abstractmethod
+    def matches(cls, warm_up: WarmUp) -> "Layout | None":
+        """Return this layout for a model by the shapes of its outputs; None if they do not fit."""
+
+    def values_agree(self, warm_up: WarmUp) -> bool:
+        """Return whether the warm-up's values agree with this layout; asked where shapes fit several layouts."""
+        return True
+
+    def preprocessing(self, dtype: Any) -> Preprocessing:
+        """Return how an image becomes the input (of element type `dtype`), unless the parameters override it."""
+        return Preprocessing("rgb", dtype != np.uint8, "letterbox")
+
+    @abstractmethod
+    def decode(self, outputs: Sequence[Output], input_px: tuple[int, int], threshold: float) -> Candidates:
+        """Return the candidates of one image; those below the score `threshold` may be left out already.
+
+        Args:
+            outputs: of one image, those of `self.outputs`.
+            input_px: (width, height) of the input.
+            threshold: score from which candidates are of use.
+
+        """
+
+    def candidates(self, outputs: Sequence[Output], input_px: tuple[int, int], threshold: float) -> Candidates:
+        """Return the candidates of one image that reach the threshold, are finite and have an area.
+
+        Args:
+            outputs: all outputs of the model, of one image.
+            input_px: (width, height) of the input.
+            threshold: least score.
+
+        """
+        found = self.decode([outputs[i] for i in self.outputs], input_px, threshold)
+        good = (found.scores >= threshold) & np.isfinite(found.xyxy).all(1) & np.isfinite(found.scores)
+        good &= (found.xyxy[:, 2:] > found.xyxy[:, :2]).all(1)
+        return Candidates(found.xyxy[good], found.scores[good], found.class_ids[good])
+
+    def __str__(self) -> str:
+        count = "" if self.classes is None else f", {self.classes} class{'' if self.classes == 1 else 'es'}"
+        return f"{self.name} ({self.description}{count})"
+
+
+def whole_ids(values: Array) -> NDArray[np.int64]:
+    """Return class numbers (K,) given as floats; -1 where one is not a number."""
+    return np.rint(np.nan_to_num(values, nan=-1.0)).astype(np.int64)
