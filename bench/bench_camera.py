@@ -192,7 +192,7 @@ def _missing(pictures: Sequence[int], count: int) -> int:
 
 def _camera_node(eye: str, file: Path, size: tuple[int, int]) -> list[str]:
     parameters = {"device": str(file), "width_px": size[0], "height_px": size[1]}
-    return NodeCommand("vergence_camera", "camera_node", parameters, [f"__ns:=/{eye}"]).argv()
+    return NodeCommand.of("camera_node", parameters, [f"__ns:=/{eye}"]).argv()
 
 
 def _transcoder(eye: str, file: Path) -> list[str]:

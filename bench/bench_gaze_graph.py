@@ -17,7 +17,7 @@ from bench.gaze_figures import STEADY_FROM_S, StaticFigures, onset_s, quantile, 
 from bench.gaze_runs import Realism, Scenario, Setting, Trace
 from bench.harness import Row
 from bench.process_head import SERVO, TARGET, ProcessHead, open_head
-from vergence_bringup.demo.ros.command import BOX_RATE_HZ, FRAME_RATE_HZ
+from vergence_bringup.ros.simulated_head import BOX_RATE_HZ, FRAME_RATE_HZ
 
 PEER = "lockstep"
 BY_CLASS, BY_CLICKS, SEARCHES, OCCLUSIONS, RAMPS = 12, 12, 6, 4, 6

@@ -74,7 +74,7 @@ def measure(skew_ns: int, seconds: float, shipped_profile: bool) -> Outcome:
         if not shipped_profile:
             environment["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(_empty_profile())
         with ProcessGroup(OUT_DIR / "graph_logs", environment) as nodes:
-            nodes.start("edge_metric_node", NodeCommand("vergence_metric", "edge_metric_node"))
+            nodes.start("edge_metric_node", NodeCommand.of("edge_metric_node"))
             with _receiver(domain) as receiver, _eyes(os.environ | environment) as eyes:
                 patience_s = time.monotonic() + 60.0
                 while not (receiver.is_matched() and all(eye.is_ready() for eye in eyes)):

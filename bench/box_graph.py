@@ -8,6 +8,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from vergence_bringup.node_table import SIMULATED, graph
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup
 from vergence_common.domains import own_domain
 from vergence_common.qos import STATE_QOS
@@ -16,19 +17,13 @@ from vergence_msgs.msg import BoxVergence, EdgeVergence
 READY_WITHIN_S = 90.0
 SETTLED_S = 5.0
 COUNTED_S = 25.0
-_GRAPH = (
-    ("vergence_sim", "sim_node"),
-    ("vergence_metric", "edge_metric_node"),
-    ("vergence_metric", "box_metric_node"),
-    ("vergence_gaze", "gaze_controller_node"),
-)
 
 
 def measure_rates(say: Callable[[str], None]) -> tuple[float, float]:
     """Return how many pairs a second box_metric_node and edge_metric_node measure, each with its shipped YAML [Hz]."""
     with own_domain() as domain, ProcessGroup(extra_environment={"ROS_DOMAIN_ID": str(domain)}) as nodes:
-        for package, executable in _GRAPH:
-            nodes.start(executable, NodeCommand(package, executable))
+        for executable in graph(SIMULATED):
+            nodes.start(executable, NodeCommand.of(executable))
         counts, statuses = _count(domain)
     say(f"statuses of metric II: {statuses}")
     return counts["box"] / COUNTED_S, counts["edge"] / COUNTED_S

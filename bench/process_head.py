@@ -11,10 +11,10 @@ from sensor_msgs.msg import JointState
 
 from bench.gaze_runs import Scenario, Trace, travel_s
 from bench.harness import OUT_DIR
-from vergence_bringup.demo.ros.command import head_nodes
 from vergence_bringup.demo.ros.recorder import Recorder, Stamped
 from vergence_bringup.demo.ros.stage import Stage, of_class
 from vergence_bringup.ros.processes import ProcessGroup, config_dir
+from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
 from vergence_common.stamps import to_seconds
 from vergence_msgs.action import LookAt
@@ -150,7 +150,7 @@ def open_head() -> Iterator[ProcessHead]:
         own_domain() as domain,
         ProcessGroup(OUT_DIR / "gaze_graph_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes,
     ):
-        for name, command in head_nodes(path).items():
+        for name, command in simulated_head(path).items():
             nodes.start(name, command)
         recorder = Recorder(domain)
         try:

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from sensor_msgs.msg import CompressedImage
 
-from vergence_bringup.ros.processes import NodeCommand, find_executable
+from vergence_bringup.ros.processes import NodeCommand, find_executable, find_node
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_nanoseconds
 
@@ -96,7 +96,7 @@ def start(domain_id: int) -> Iterator[Start]:
     processes: list[subprocess.Popen[str]] = []
 
     def make(eye: str, device: str, *more: str, **parameters: object) -> "subprocess.Popen[str]":
-        command = NodeCommand("vergence_camera", "camera_node", {"device": device, **parameters}, [f"__ns:=/{eye}"])
+        command = NodeCommand.of("camera_node", {"device": device, **parameters}, [f"__ns:=/{eye}"])
         arguments = [*command.argv(), *more]
         processes.append(subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
         return processes[-1]
@@ -215,7 +215,7 @@ def test_a_recording_played_once_is_seen_to_its_end_and_ends_well(
 def test_a_broken_yaml_ends_the_node_with_one_line(domain_id: int, tmp_path: Path, yaml: str, words: list[str]) -> None:
     file = tmp_path / "broken.yaml"
     file.write_text(f"/**:\n  ros__parameters: {yaml}\n")
-    executable = str(find_executable("vergence_camera", "camera_node"))
+    executable = str(find_node("camera_node"))
     result = subprocess.run(
         [executable, "--ros-args", "--params-file", str(file)], capture_output=True, text=True, timeout=TIMEOUT_S
     )

@@ -64,7 +64,7 @@ class Processes:
         self._running: list[subprocess.Popen[str]] = []
 
     def camera(self, recording: Path, *where: str) -> None:
-        command = NodeCommand("vergence_camera", "camera_node", {"device": str(recording)}, ["__ns:=/left"])
+        command = NodeCommand.of("camera_node", {"device": str(recording)}, ["__ns:=/left"])
         self._run([*where, *command.argv()])
 
     def reader(self, *where: str) -> Reader:

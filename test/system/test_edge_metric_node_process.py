@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
-from vergence_bringup.ros.processes import find_executable
+from vergence_bringup.ros.processes import find_node
 
 pytestmark = pytest.mark.system
 
@@ -23,7 +23,7 @@ CONFIG = Path(__file__).resolve().parents[2] / "config" / "edge_metric_node.yaml
 
 
 def command(*arguments: str) -> list[str]:
-    return [str(find_executable("vergence_metric", "edge_metric_node")), "--ros-args", *arguments]
+    return [str(find_node("edge_metric_node")), "--ros-args", *arguments]
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from vergence_bringup.node_table import NODES
-from vergence_bringup.ros.processes import find_executable
+from vergence_bringup.ros.processes import find_node
 
 pytestmark = pytest.mark.system
 
@@ -17,7 +17,7 @@ CONFIG = Path(__file__).resolve().parents[2] / "config"
 
 
 def _command(executable: str, *arguments: str) -> list[str]:
-    return [str(find_executable(NODES[executable].package, executable)), "--ros-args", *arguments]
+    return [str(find_node(executable)), "--ros-args", *arguments]
 
 
 def _run(executable: str, *arguments: str) -> "subprocess.CompletedProcess[str]":

@@ -21,6 +21,8 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, PushRosNamespace
 
+from vergence_bringup.node_table import NODES
+
 CLEAN_END, REFUSED = 0, 2
 
 
@@ -36,7 +38,7 @@ def generate_launch_description() -> LaunchDescription:
     config = Path(get_package_share_directory("vergence_bringup")) / "config"
     names = ("rig", "backend", "servos", "start")
     servo_node = Node(
-        package="vergence_servo",
+        package=NODES["servo_node"].package,
         executable="servo_node",
         output="screen",
         # the next start releases whatever a crash left pulsing

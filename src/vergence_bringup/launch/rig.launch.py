@@ -95,12 +95,7 @@ def generate_launch_description() -> LaunchDescription:
                     camera("left", "hold"),
                     camera("right", "follow", left_camera),
                     node("edge_metric_node"),
-                    node(
-                        "vergence_metric",
-                        "box_metric_node",
-                        "detector",
-                        **{"detector.model": text(LaunchConfiguration("model"))},
-                    ),
+                    node("box_metric_node", "detector", **{"detector.model": text(LaunchConfiguration("model"))}),
                     node("eye_rotation_node", "encoder"),
                     node("gaze_controller_node"),
                     node("servo_node", "servos"),

@@ -12,14 +12,16 @@ from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node, PushRosNamespace
 
+from vergence_bringup.node_table import NODES
+
 
 def generate_launch_description() -> LaunchDescription:
     config = Path(get_package_share_directory("vergence_bringup")) / "config"
     rig = LaunchConfiguration("rig")
 
-    def node(package: str, executable: str, condition: str | None = None, **parameters: object) -> Node:
+    def node(executable: str, condition: str | None = None, **parameters: object) -> Node:
         return Node(
-            package=package,
+            package=NODES[executable].package,
             executable=executable,
             output="screen",
             parameters=[str(config / f"{executable}.yaml"), {"rig": rig, **parameters}],
@@ -44,11 +46,11 @@ def generate_launch_description() -> LaunchDescription:
             GroupAction(
                 [
                     PushRosNamespace(LaunchConfiguration("namespace")),
-                    node("vergence_sim", "sim_node", preset=LaunchConfiguration("preset")),
-                    node("vergence_metric", "edge_metric_node"),
-                    node("vergence_metric", "box_metric_node", "detector"),
-                    node("vergence_metric", "eye_rotation_node", "encoder"),
-                    node("vergence_gaze", "gaze_controller_node"),
+                    node("sim_node", preset=LaunchConfiguration("preset")),
+                    node("edge_metric_node"),
+                    node("box_metric_node", "detector"),
+                    node("eye_rotation_node", "encoder"),
+                    node("gaze_controller_node"),
                 ]
             ),
         ]

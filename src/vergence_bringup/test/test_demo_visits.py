@@ -11,8 +11,8 @@ from vergence_bringup.command_line import main
 from vergence_bringup.demo.result import StationResult, unfinished
 from vergence_bringup.demo.ros import command as demo
 from vergence_bringup.demo.stations import stations
-from vergence_bringup.demo.visits import GraphError, visit_all
-from vergence_bringup.ros.processes import ProcessError
+from vergence_bringup.demo.visits import visit_all
+from vergence_bringup.graph_errors import GraphError, ProcessError
 
 THREE = stations(0.065, short=True)
 

@@ -1,4 +1,4 @@
-"""Processes live and end together, whatever they do."""
+"""Processes are started and ended together, whatever they do."""
 
 import os
 import signal
@@ -9,8 +9,9 @@ import time
 
 import pytest
 
+from vergence_bringup.graph_errors import ProcessError
 from vergence_bringup.ros import processes
-from vergence_bringup.ros.processes import NodeCommand, ProcessError, ProcessGroup, find_executable
+from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, find_executable
 
 
 @pytest.fixture
@@ -55,16 +56,16 @@ def test_one_that_will_not_end_is_killed(script, tmp_path):
         "print('ready', flush=True)\ntime.sleep(60)"
     )
     with ProcessGroup(log_dir=tmp_path / "log") as group:
-        group.start("deaf", script("deaf", body))
-        _wait_ready(tmp_path / "log" / "deaf.log")
-        assert group.stop(patience_s=0.2) == {"deaf": -signal.SIGKILL}
+        group.start("stubborn", script("stubborn", body))
+        _wait_ready(tmp_path / "log" / "stubborn.log")
+        assert group.stop(timeout_s=0.2) == {"stubborn": -signal.SIGKILL}
 
 
-def test_one_that_ended_by_itself_is_named_with_its_last_words(script, tmp_path):
+def test_one_that_ended_by_itself_is_named_with_the_end_of_its_log(script, tmp_path):
     with ProcessGroup(log_dir=tmp_path / "log") as group:
-        group.start("weak", script("weak", "import sys; print('parameter x is 3: allowed is 1'); sys.exit(2)"))
+        group.start("weak", script("weak", "import sys; print('parameter x must be 1: got 3'); sys.exit(2)"))
         group._running["weak"].wait(90)
-        with pytest.raises(ProcessError, match=r"weak ended with status 2[\s\S]*parameter x is 3"):
+        with pytest.raises(ProcessError, match=r"weak ended with status 2[\s\S]*parameter x must be 1"):
             group.check()
 
 

@@ -1,28 +1,42 @@
-"""The nodes of the graph: the one table that executables, doctor, demo, benchmarks and launch files read."""
+"""The table of nodes: packages, parameter groups and graphs, for executables, doctor, demo, bench and launch files."""
 
 import importlib
 from dataclasses import dataclass
 
 from vergence_rig.parameters import Groups
 
+REAL, SIMULATED = "real", "simulated"
+
 
 @dataclass(frozen=True)
 class NodeEntry:
-    """One node: its package, and where its parameter groups stand, as "module:NAME" of a `Groups`."""
+    """One node.
+
+    Attributes:
+        package: the ROS package that holds its executable.
+        groups: its parameter groups, as "module:NAME" of a `Groups`.
+        heads: the kinds of head whose graph it belongs to: REAL, SIMULATED, both or none.
+    """
 
     package: str
     groups: str
+    heads: tuple[str, ...] = (REAL, SIMULATED)
 
 
 NODES: dict[str, NodeEntry] = {
     "box_metric_node": NodeEntry("vergence_metric", "vergence_metric.boxes.parameters:GROUPS"),
-    "camera_node": NodeEntry("vergence_camera", "vergence_camera.parameters:GROUPS"),
+    "camera_node": NodeEntry("vergence_camera", "vergence_camera.parameters:GROUPS", heads=(REAL,)),
     "edge_metric_node": NodeEntry("vergence_metric", "vergence_metric.measurement.parameters:GROUPS"),
     "eye_rotation_node": NodeEntry("vergence_metric", "vergence_metric.eye_rotation.parameters:GROUPS"),
     "gaze_controller_node": NodeEntry("vergence_gaze", "vergence_gaze.parameters:GROUPS"),
-    "servo_node": NodeEntry("vergence_servo", "vergence_servo.servo_parameters:GROUPS"),
-    "sim_node": NodeEntry("vergence_sim", "vergence_sim.parameters:GROUPS"),
+    "servo_node": NodeEntry("vergence_servo", "vergence_servo.parameters:GROUPS", heads=(REAL,)),
+    "sim_node": NodeEntry("vergence_sim", "vergence_sim.parameters:GROUPS", heads=(SIMULATED,)),
 }
+
+
+def graph(head: str) -> tuple[str, ...]:
+    """Return the executables of the whole graph of a REAL or a SIMULATED head."""
+    return tuple(executable for executable, entry in NODES.items() if head in entry.heads)
 
 
 def parameter_groups(executable: str) -> Groups:

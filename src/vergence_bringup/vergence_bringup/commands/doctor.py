@@ -14,7 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vergence_bringup.ros.processes import ProcessError, config_dir, find_executable
+from vergence_bringup.graph_errors import ProcessError
+from vergence_bringup.node_table import NODES
+from vergence_bringup.ros.processes import config_dir, find_node
 from vergence_rig.finding import Finding
 
 _SHM_WANTED_MB = 64  # two cameras, three readers and slack, in segments of 16 MiB
@@ -85,21 +87,13 @@ def _ros() -> Iterable[Finding]:
 
 
 def _nodes() -> Iterable[Finding]:
-    nodes = (
-        ("vergence_camera", "camera_node"),
-        ("vergence_metric", "edge_metric_node"),
-        ("vergence_metric", "box_metric_node"),
-        ("vergence_gaze", "gaze_controller_node"),
-        ("vergence_servo", "servo_node"),
-        ("vergence_sim", "sim_node"),
-    )
     absent = []
-    for package, executable in nodes:
+    for executable in NODES:
         try:
-            find_executable(package, executable)
+            find_node(executable)
         except ProcessError as error:
             absent.append(str(error))
-    message = f"{len(nodes) - len(absent)} of {len(nodes)} built" + "".join(f"; {text}" for text in absent)
+    message = f"{len(NODES) - len(absent)} of {len(NODES)} are built" + "".join(f"; {text}" for text in absent)
     yield Finding("nodes", not absent, message, "make setup, then source env.sh")
 
 

@@ -6,11 +6,7 @@ from typing import Protocol
 
 from vergence_bringup.demo.result import StationResult, unfinished
 from vergence_bringup.demo.stations import Station
-from vergence_bringup.ros.processes import ProcessError
-
-
-class GraphError(RuntimeError):
-    """The graph did not answer as it must."""
+from vergence_bringup.graph_errors import GraphError, ProcessError
 
 
 class Runner(Protocol):

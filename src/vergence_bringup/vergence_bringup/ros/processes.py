@@ -1,4 +1,4 @@
-"""Nodes as processes of their own: found, started, watched and ended together."""
+"""Nodes as processes: found, started, monitored and ended together."""
 
 import ctypes
 import os
@@ -14,11 +14,10 @@ from typing import IO
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix, get_package_share_directory
 
+from vergence_bringup.graph_errors import ProcessError
+from vergence_bringup.node_table import NODES
+
 _PR_SET_PDEATHSIG = 1
-
-
-class ProcessError(ValueError):
-    """A node that cannot be started, or that ended by itself."""
 
 
 def config_dir() -> Path:
@@ -34,22 +33,34 @@ def find_executable(package: str, executable: str) -> Path:
         path = Path(get_package_prefix(package)) / "lib" / package / executable
     except PackageNotFoundError:
         raise ProcessError(
-            f"package {package!r} is not built or not sourced: source env.sh, or run make setup"
+            f"package {package!r} is not built, or this shell does not have it: run make setup, then source env.sh"
         ) from None
     if not path.exists():
-        raise ProcessError(f"{package} has no executable {executable!r}: allowed is what lies in {path.parent}")
+        raise ProcessError(f"executable of {package} must be in {path.parent}: got {executable!r}")
     return path
+
+
+def find_node(executable: str) -> Path:
+    """Return the path of a node of the table; raises ProcessError where it is not built."""
+    return find_executable(NODES[executable].package, executable)
 
 
 @dataclass(frozen=True)
 class NodeCommand:
-    """One node to run: parameters override its YAML file, remappings are 'from:=to'."""
+    """The command line of one node: parameters override its YAML file, remappings are 'from:=to'."""
 
     package: str
     executable: str
     parameters: Mapping[str, object] | None = None
     remappings: Sequence[str] = ()
     params_file: Path | None = None
+
+    @classmethod
+    def of(
+        cls, executable: str, parameters: Mapping[str, object] | None = None, remappings: Sequence[str] = ()
+    ) -> "NodeCommand":
+        """Return the command of a node of the table, with its shipped YAML file."""
+        return cls(NODES[executable].package, executable, parameters, remappings)
 
     def argv(self) -> list[str]:
         """Return the command line."""
@@ -68,12 +79,12 @@ def _yaml(value: object) -> str:
         return str(value).lower()
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_yaml(element) for element in value) + "]"
-    # The quotes keep an empty or a numeric text a text.
+    # Quoted, so that an empty or numeric string stays a string.
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 def environment(extra: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return this process's environment with the shipped Fast DDS profile, discovery kept to this host, and `extra`."""
+    """Return this process's environment, the shipped Fast DDS profile, discovery limited to this host, and `extra`."""
     env = dict(os.environ)
     env.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(config_dir() / "fastdds.xml"))
     env.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
@@ -82,11 +93,11 @@ def environment(extra: Mapping[str, str] | None = None) -> dict[str, str]:
 
 
 class ProcessGroup:
-    """Processes that live and end together; a context manager that ends them all on the way out.
+    """Processes that are started and ended together; a context manager that ends them all on exit.
 
-    Each runs in a process group of its own, so that a Ctrl-C in the terminal reaches it only through `stop`, once; and
-    each asks the kernel for SIGTERM should this process die without a chance to stop it. They stay in one session, as
-    nodes of one launch do: Linux shares the cores evenly between sessions, whatever the niceness within them.
+    Each is in a process group of its own, so that a Ctrl-C in the terminal reaches it only through `stop`, once; the
+    kernel sends each a SIGTERM if this process dies without stopping it. They stay in one session, as nodes of one
+    launch do: Linux shares the cores evenly between sessions, whatever the niceness within them.
     """
 
     def __init__(self, log_dir: Path | None = None, extra_environment: Mapping[str, str] | None = None) -> None:
@@ -120,18 +131,18 @@ class ProcessGroup:
         )
 
     def check(self) -> None:
-        """Raise ProcessError if a process has ended by itself."""
+        """Raise ProcessError if a process has ended unexpectedly."""
         for name, process in self._running.items():
             if process.poll() is not None:
                 raise ProcessError(f"{name} ended with status {process.returncode}{self._tail(name)}")
 
-    def stop(self, patience_s: float = 5.0) -> dict[str, int]:
-        """End every process: SIGINT, then SIGTERM, then SIGKILL. Returns the exit status of each by name."""
+    def stop(self, timeout_s: float = 5.0) -> dict[str, int]:
+        """End all: SIGINT, SIGTERM after `timeout_s`, then SIGKILL. Return the exit status of each by name."""
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
             waiting = [process for process in self._running.values() if process.poll() is None]
             for process in waiting:
                 _signal_group(process.pid, number)
-            deadline = time.monotonic() + patience_s
+            deadline = time.monotonic() + timeout_s
             for process in waiting:
                 try:
                     process.wait(max(0.01, deadline - time.monotonic()))

@@ -17,13 +17,9 @@ from vergence_bringup.demo.result import StationResult, table, write_summary
 from vergence_bringup.demo.stations import Station, stations
 from vergence_bringup.demo.visits import Runner, visit_all
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir, environment
+from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
 from vergence_rig.rig import Rig, load_rig
-
-# The simulator, its ground truth and the demo's recorder share two cores with the nodes: what they cannot keep up with
-# comes late, and late images are worth less than fewer.
-FRAME_RATE_HZ = 20.0
-BOX_RATE_HZ = 8.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,21 +96,10 @@ def _runner(options: argparse.Namespace, rig: Rig, alive: Callable[[], None]) ->
         recorder.close()
 
 
-def head_nodes(rig: Path, **sim: object) -> dict[str, NodeCommand]:
-    """Return the nodes of a simulated head by name, with their shipped YAML; `sim` are parameters of sim_node."""
-    at = {"rig": str(rig)}
-    return {
-        "sim_node": NodeCommand("vergence_sim", "sim_node", at | {"camera.frame_rate_hz": FRAME_RATE_HZ} | sim),
-        "edge_metric_node": NodeCommand("vergence_metric", "edge_metric_node", at),
-        "box_metric_node": NodeCommand("vergence_metric", "box_metric_node", at | {"rate_hz": BOX_RATE_HZ}),
-        "gaze_controller_node": NodeCommand("vergence_gaze", "gaze_controller_node", at),
-    }
-
-
 def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
     if options.ideal:
-        return head_nodes(_ideal_rig(options.out), seed=options.seed, preset="ideal")
-    return head_nodes(config_dir() / "rig.yaml", seed=options.seed)
+        return simulated_head(_ideal_rig(options.out), seed=options.seed, preset="ideal")
+    return simulated_head(config_dir() / "rig.yaml", seed=options.seed)
 
 
 def _ideal_rig(out_dir: Path) -> Path:

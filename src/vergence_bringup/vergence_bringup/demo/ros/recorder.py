@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import Image
 
-from vergence_bringup.demo.visits import GraphError
+from vergence_bringup.graph_errors import GraphError
 from vergence_common.images import image_to_array
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_common.stamps import to_nanoseconds
