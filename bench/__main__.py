@@ -7,7 +7,7 @@ import sys
 import time
 
 import bench
-from bench import harness
+from bench import results
 
 
 def names() -> list[str]:
@@ -31,9 +31,9 @@ def main() -> int:
             print(f"   {name} failed: {type(error).__name__}: {error}", flush=True)
             failed.append(name)
             continue
-        path = harness.write(name, rows)
-        print(getattr(module, "table", harness.table)(rows))
-        print(f"   {time.monotonic() - started:.0f} s, written to {path.relative_to(harness.OUT_DIR.parent.parent)}")
+        path = results.write(name, rows)
+        print(getattr(module, "table", results.table)(rows))
+        print(f"   {time.monotonic() - started:.0f} s, written to {path.relative_to(results.OUT_DIR.parent.parent)}")
     if failed:
         print(f"\nfailed: {', '.join(failed)}")
     return 1 if failed else 0

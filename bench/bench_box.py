@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.box_graph import measure_rates
-from bench.harness import Row
+from bench.box_rates import measure_rates
+from bench.results import Row
 from training.average_precision import iou_matrix
 from training.scenes import Stage
 from vergence_metric.boxes import BoxMeasurement, BoxStatus, BoxVergenceResult

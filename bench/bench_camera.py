@@ -25,7 +25,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage
 
-from bench.harness import Row
+from bench.results import Row
 from vergence_bringup.ros.processes import NodeCommand, environment
 from vergence_camera.sources.recordings import AviRecording
 from vergence_common.domains import own_domain

@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.edge_scenes import (
+from bench.contrast_renders import frames
+from bench.contrast_scenes import (
     FITTED_DRAWINGS,
     FITTED_PHOTOGRAPHS,
     HARD,
@@ -20,8 +21,7 @@ from bench.edge_scenes import (
     judged_pairs,
     textured,
 )
-from bench.harness import Row
-from bench.rendered_scenes import frames
+from bench.results import Row
 from vergence_metric.edges.parameters import EdgeMetricParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_sim.parameters import SimParameters

@@ -14,7 +14,7 @@ import onnx
 import onnxruntime
 from onnx import TensorProto, helper, numpy_helper
 
-from bench.harness import Row
+from bench.results import Row
 from training.average_precision import ImageResult, average_precision, mean_average_precision
 from training.scenes import Stage, View
 from vergence_metric.boxes import Detector

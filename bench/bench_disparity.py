@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.registration import phase_cross_correlation
 
-from bench.fovea_scenes import scenes
-from bench.harness import Row
-from bench.textured_pairs import Pair, clean, deceptive, hard
+from bench.disparity_pairs import Pair, clean, deceptive, hard
+from bench.disparity_scenes import scenes
+from bench.results import Row
 from vergence_metric.disparity import estimator_names, make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
 
@@ -61,7 +61,7 @@ def _accuracy(condition: str, cases: list[tuple[Image, Image, Point, float]]) ->
     peer = min(peers, key=lambda name: peers[name])
     rows = [Row(f"disparity.peer.{name.split()[-1]}.{condition}", value, "px RMS") for name, value in peers.items()]
     for name in estimator_names():
-        estimator = make_estimator(DisparityParameters(disparity_estimator=name))
+        estimator = make_estimator(DisparityParameters(estimator=name))
         started = time.perf_counter()
         answers = [estimator.estimate(left, right, point) for left, right, point, _ in cases]
         each_ms = 1e3 * (time.perf_counter() - started) / len(cases)
@@ -70,7 +70,7 @@ def _accuracy(condition: str, cases: list[tuple[Image, Image, Point, float]]) ->
         good = np.abs(errors) <= _WRONG_PX
         rms = _rms(errors[confident])
         rows.append(Row(f"disparity.{name}.{condition}", rms, "px RMS", peer, peers[peer]))
-        if name == DisparityParameters().disparity_estimator:
+        if name == DisparityParameters().estimator:
             share = float((confident & good).sum() / max(good.sum(), 1))
             rows.append(Row(f"disparity.confident_share.{condition}", share, "of good answers"))
             rows.append(Row(f"disparity.good_share.{condition}", float(good.mean()), "within 2 px"))

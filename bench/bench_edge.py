@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from bench.harness import Row
+from bench.results import Row
 from vergence_metric.edges.chance import chance_levels
 from vergence_metric.edges.contrast import contrasts, foveal_contrast
 from vergence_metric.edges.edge_distance import EdgeDistances, edge_distances

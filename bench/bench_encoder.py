@@ -16,7 +16,7 @@ from bench import gaze_runs
 from bench import gaze_scenarios as scenarios
 from bench.encoder_readings import RenderedRooms
 from bench.gaze_runs import Setting
-from bench.harness import Row
+from bench.results import Row
 from vergence_rig.rig import default_rig
 from vergence_rig.servo import SG90
 from vergence_sim.parameters import SimParameters

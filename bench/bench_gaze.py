@@ -13,7 +13,7 @@ from bench import gaze_figures as figures
 from bench.gaze_figures import DEFAULT
 from bench.gaze_runs import SERVOS, Setting
 from bench.gaze_table import table
-from bench.harness import Row
+from bench.results import Row
 
 __all__ = ["run", "table"]
 

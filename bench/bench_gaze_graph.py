@@ -14,9 +14,9 @@ import numpy.typing as npt
 from bench import gaze_runs
 from bench import gaze_scenarios as scenarios
 from bench.gaze_figures import STEADY_FROM_S, StaticFigures, onset_s, quantile, steady_error_deg
+from bench.gaze_graph_head import SERVO, TARGET, ProcessHead, open_head
 from bench.gaze_runs import Realism, Scenario, Setting, Trace
-from bench.harness import Row
-from bench.process_head import SERVO, TARGET, ProcessHead, open_head
+from bench.results import Row
 from vergence_bringup.ros.simulated_head import BOX_RATE_HZ, FRAME_RATE_HZ
 
 PEER = "lockstep"

@@ -22,7 +22,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from bench.harness import OUT_DIR, Row
+from bench.results import OUT_DIR, Row
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup
 from vergence_common.domains import own_domain
 from vergence_common.qos import STATE_QOS
@@ -93,11 +93,11 @@ def _empty_profile() -> Path:
 
 
 class Eye:
-    """One `bench.eye_publisher` and the lines that go to and fro."""
+    """One `bench.graph_eye_publisher` and the lines that go to and fro."""
 
     def __init__(self, topic: str, shift_px: int, environment: dict[str, str]) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "bench.eye_publisher", topic, str(shift_px)],
+            [sys.executable, "-m", "bench.graph_eye_publisher", topic, str(shift_px)],
             env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -118,7 +118,7 @@ class Eye:
         return self._ready
 
     def start(self, **timetable: int) -> None:
-        """Let it publish; see `bench.eye_publisher`."""
+        """Let it publish; see `bench.graph_eye_publisher`."""
         print(json.dumps(timetable), file=self._to, flush=True)
 
     def published_ns(self) -> dict[int, int]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.harness import Row
+from bench.results import Row
 from vergence_metric.pairs.pairing import LEFT, RIGHT, StereoPairer
 from vergence_metric.pairs.parameters import PairingParameters
 

@@ -14,10 +14,10 @@ from concurrent.futures import ProcessPoolExecutor
 import cv2
 
 from bench import photos_disparity, photos_figures
-from bench.harness import Row, table
 from bench.photos_data import NoPhotographsError, pair_names
 from bench.photos_trials import Outcome, Trial
 from bench.photos_trials import run as run_trial
+from bench.results import Row, table
 
 __all__ = ["run", "table"]
 

@@ -21,7 +21,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from bench.harness import Row
+from bench.results import Row
 from vergence_common.domains import own_domain
 from vergence_rig.rig import default_rig
 from vergence_servo.calibration import ServoLimits, default_servos, servo_limits
@@ -29,6 +29,7 @@ from vergence_servo.command_guard import CommandRefusedError, StampGuard, StampL
 from vergence_servo.drivers.fake import FakeDriver, FakeParameters
 from vergence_servo.drivers.protocol import DriverIoError
 from vergence_servo.safety import grid_ends, safe_pulse_us
+from vergence_servo.servo_channel import RetryParameters
 from vergence_servo.servo_head import HeadParameters, ServoHead
 
 COMMANDS = 1000
@@ -172,10 +173,11 @@ def hostile_violations(count: int) -> tuple[int, int, int]:
     limits = {name: servo_limits(name, servo, rig.joints[name]) for name, servo in default_servos().items()}
     by_channel = {limit.calibration.channel: limit for limit in limits.values()}
     violations = taken = written = 0
-    parameters = HeadParameters(stagger_s=0.01, retry_first_s=0.02, retry_longest_s=0.1, release_timeout_s=1.0)
+    parameters = HeadParameters(stagger_s=0.01, release_timeout_s=1.0)
+    retry = RetryParameters(first_s=0.02, longest_s=0.1)
     for grid_us in GRIDS_US.values():
         wires = _Watched(by_channel, grid_us, random)
-        head = ServoHead(wires, limits, parameters, {"tilt": float(random.uniform(-9, 9))}, wires.now_s)
+        head = ServoHead(wires, limits, parameters, {"tilt": float(random.uniform(-9, 9))}, wires.now_s, retry)
         stamps = StampGuard(StampLimits(0.5, 0.1, 0.5))
         for _ in range(count // len(GRIDS_US)):
             wires.now_s += _pause_s(random)

@@ -6,7 +6,7 @@ from contextlib import closing
 
 import numpy as np
 
-from bench.harness import Row
+from bench.results import Row
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from bench.fovea_scenes import scenes
-from bench.harness import Row
+from bench.disparity_scenes import scenes
+from bench.results import Row
 from vergence_metric.tracking.zero_disparity import zero_disparity
 
 _SCENES = 80

@@ -10,7 +10,7 @@ from bench import gaze_runs
 from bench import gaze_scenarios as scenarios
 from bench.encoder_readings import DrawnFeatures
 from bench.gaze_runs import SERVOS, Scenario, Setting, Trace, tolerance_deg
-from bench.harness import Row
+from bench.results import Row
 
 DEFAULT = Setting()
 KEPT_DEG = 1.0

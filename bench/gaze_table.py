@@ -3,8 +3,8 @@
 import re
 from collections.abc import Iterable
 
-from bench.harness import Row, figure_text
-from bench.harness import table as plain_table
+from bench.results import Row, figure_text
+from bench.results import table as plain_table
 
 _SETTING = re.compile(r"^(?P<figure>.+)\.(?P<law>[a-z_]+)\.(?P<servo>ideal|sg90|mg995)\.(?P<latency>\d+)$")
 _USUAL = ("predictive", "sg90", "60")

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from bench.harness import Row
 from bench.photos_data import KnownPoint, grey_pair, motorcycle_points, pair_names, targets
+from bench.results import Row
 from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from bench.harness import Row
 from bench.photos_data import LIT_DIFFERENTLY, pair_names, targets
 from bench.photos_trials import SETTINGS, Outcome, Trial
+from bench.results import Row
 
 MISMATCHES = [name for name in SETTINGS if name.startswith("mismatch.")]
 _NEAR_DEG = 5.0

@@ -23,9 +23,9 @@ matplotlib.use("Agg")
 
 from matplotlib import pyplot as plt
 
-from bench.rendered_scenes import fixated_surface, look_at
 from vergence_metric.edges.parameters import EdgeMetricParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric
+from vergence_sim.fixation import fixated_surface, look_at
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
 

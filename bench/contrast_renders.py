@@ -1,4 +1,4 @@
-"""Rendered pairs with a known vergence error: a target before a furnished room, in any of the simulator's worlds."""
+"""The contrast benchmark's rendered pairs with a known vergence error: a target in a furnished room."""
 
 import math
 from collections.abc import Iterator
@@ -7,33 +7,11 @@ from contextlib import closing
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_rig.geometry import gaze_for_point
+from vergence_sim.fixation import fixated_surface, look_at
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator, StereoFrame
 
 TARGETS = ("cube", "marker")
-
-
-def look_at(simulator: Simulator, point_m: NDArray[np.float64], vergence_error_rad: float) -> StereoFrame:
-    """Return what the eyes see when the left one looks at a point and the right one misses it by an angle.
-
-    A positive error means that the eyes have to converge more, as in VergenceError.
-    """
-    angles = gaze_for_point(point_m, simulator.rig.baseline_m)
-    simulator.set_head(
-        {
-            "pan_left": angles.pan_left_rad,
-            "pan_right": angles.pan_right_rad - vergence_error_rad,
-            "tilt": angles.tilt_rad,
-        }
-    )
-    return simulator.capture()
-
-
-def fixated_surface(simulator: Simulator, target: str, centre_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Put a target somewhere and return the point of its surface that a verged gaze meets [m], rig_base."""
-    simulator.place_target(target, centre_m)
-    return np.asarray(simulator.truth().target_point_m, np.float64)
 
 
 def random_place(rng: np.random.Generator) -> NDArray[np.float64]:

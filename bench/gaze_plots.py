@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/control.md from the runs that bench_gaze measures: `python -m bench.plot_gaze [DIR]`."""
+"""Draw the pictures of docs/control.md from the runs that bench_gaze measures: `python -m bench.gaze_plots [DIR]`."""
 
 import math
 import sys

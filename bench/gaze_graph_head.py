@@ -10,7 +10,7 @@ import numpy.typing as npt
 from sensor_msgs.msg import JointState
 
 from bench.gaze_runs import Scenario, Trace, travel_s
-from bench.harness import OUT_DIR
+from bench.results import OUT_DIR
 from vergence_bringup.demo.ros.recorder import Recorder, Stamped
 from vergence_bringup.demo.ros.stage import Stage, of_class
 from vergence_bringup.ros.processes import ProcessGroup, config_dir

@@ -1,6 +1,6 @@
 """One eye as a process of its own: publishes image_raw on a timetable and writes down when.
 
-    python -m bench.eye_publisher TOPIC SHIFT_PX
+    python -m bench.graph_eye_publisher TOPIC SHIFT_PX
 
 Prints `ready` when it has been matched, reads one line of JSON {start_ns, period_ns, offset_ns, count} (monotonic
 time), publishes `count` images whose stamps follow the timetable, and prints one line of JSON: a list of [stamp_ns,
