@@ -17,6 +17,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
+            "photo_node = vergence_sim.ros.photo_node:main",
             "sim_node = vergence_sim.ros.sim_node:main",
         ]
     },

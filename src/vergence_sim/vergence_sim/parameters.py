@@ -92,6 +92,14 @@ class WorldParameters(Parameters):
         read_only=True,
         formerly="distractor",
     )
+    samples_per_pixel: int = parameter(
+        0,
+        "samples of the renderer's antialiasing; 0 for none",
+        minimum=0,
+        maximum=16,
+        read_only=True,
+        formerly="samples",
+    )
 
 
 @dataclass(frozen=True)
@@ -142,14 +150,6 @@ class CameraParameters(Parameters):
         maximum=1,
         read_only=True,
         formerly="distortion",
-    )
-    samples_per_pixel: int = parameter(
-        0,
-        "samples of the renderer's antialiasing; 0 for none",
-        minimum=0,
-        maximum=16,
-        read_only=True,
-        formerly="samples",
     )
 
 

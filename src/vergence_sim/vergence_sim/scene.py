@@ -216,7 +216,7 @@ def build_scene(rig: Rig, parameters: SimParameters, fovy_rad: float, textured: 
     return _compiled(
         rig,
         world.seed,
-        parameters.camera.samples_per_pixel,
+        parameters.world.samples_per_pixel,
         world.light,
         fovy_rad,
         mounts,

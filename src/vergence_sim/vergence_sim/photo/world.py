@@ -109,6 +109,9 @@ class PhotoWorld:
         joints = self.head.true_rad
         return EyeAngles(joints["pan_left"], joints["pan_right"], joints["tilt"])
 
+    def close(self) -> None:
+        """Nothing is held."""
+
     def joint_states(self) -> dict[str, float]:
         """Return the joint angles as a driver of servos without feedback publishes them [rad]."""
         return self.head.modelled_rad

@@ -1,0 +1,161 @@
+"""photo_node's parameters: the photographs, the head before them, and how its joints differ from rig.yaml."""
+
+from dataclasses import dataclass
+
+from vergence_rig.parameters import REQUIRED, Groups, ParameterError, Parameters, parameter
+from vergence_rig.rig import JOINT_NAMES, Rig
+from vergence_rig.servo import PRESETS
+from vergence_sim.parameters import (
+    CameraParameters,
+    LeftCameraParameters,
+    RightCameraParameters,
+    SimParameters,
+    SimulationParameters,
+)
+from vergence_sim.photo.joints import Plant
+from vergence_sim.photo.pair import PhotoPoint
+
+
+@dataclass(frozen=True)
+class PhotoParameters(Parameters):
+    """The photographs and the head before them."""
+
+    left: str = parameter(
+        REQUIRED, "path of the left photograph of a rectified stereo pair (JPEG, PNG, ...)", read_only=True
+    )
+    right: str = parameter(REQUIRED, "path of the right photograph, of the same size as the left one", read_only=True)
+    fx_px: float = parameter(
+        0.0,
+        "focal length of both photographs; 0 for 0.85 times their width. Any value shows a consistent scene",
+        unit="px",
+        minimum=0,
+        maximum=1e5,
+        read_only=True,
+    )
+    cx_px: float = parameter(
+        0.0,
+        "x of the photographs' principal point; 0 for their centre",
+        unit="px",
+        minimum=-1e5,
+        maximum=1e5,
+        read_only=True,
+    )
+    cy_px: float = parameter(
+        0.0,
+        "y of the photographs' principal point; 0 for their centre",
+        unit="px",
+        minimum=-1e5,
+        maximum=1e5,
+        read_only=True,
+    )
+    view_width_px: int = parameter(
+        480,
+        "width of the published images: those of rig.yaml's cameras, cut about their centres, so that a photograph "
+        "fills them at more poses; 0 for rig.yaml's",
+        unit="px",
+        minimum=0,
+        maximum=16384,
+        read_only=True,
+    )
+    view_height_px: int = parameter(
+        320,
+        "height of the published images; 0 for that of rig.yaml's cameras",
+        unit="px",
+        minimum=0,
+        maximum=16384,
+        read_only=True,
+    )
+    points_px: tuple[float, ...] = parameter(
+        (),
+        "points of known depth: x and y in the left photograph and disparity x_left - x_right, three numbers a point",
+        unit="px",
+        minimum=-1e5,
+        maximum=1e5,
+        read_only=True,
+    )
+    point: int = parameter(
+        0, "number of the point of points_px, from 0, that ground_truth/* is about", minimum=0, maximum=100000
+    )
+    rig: str = parameter("", "path of rig.yaml; empty for the built-in rig", read_only=True)
+    preset: str = parameter(
+        "realistic",
+        "realistic: imperfections as the other parameters say; ideal: ideal servos and cameras, whatever they say",
+        choices=("realistic", "ideal"),
+        read_only=True,
+    )
+    seed: int = parameter(
+        0, "seed of sensor noise and of exposure jitter", minimum=0, maximum=2**31 - 1, read_only=True
+    )
+    joint_rate_hz: float = parameter(
+        50.0, "rate at which joint_states is published", unit="Hz", minimum=1, maximum=1000, read_only=True
+    )
+
+    def check(self) -> None:
+        """Hold the points to whole triples."""
+        if len(self.points_px) % 3:
+            raise ParameterError("points_px", self.points_px, "three numbers, x y disparity, for every point")
+
+    @property
+    def points(self) -> tuple[PhotoPoint, ...]:
+        """The points whose depth is known."""
+        numbers = self.points_px
+        return tuple(PhotoPoint(*numbers[i : i + 3]) for i in range(0, len(numbers), 3))
+
+
+@dataclass(frozen=True)
+class PlantParameters(Parameters):
+    """The joints as they really are; joint_states is what a driver publishes that has only rig.yaml."""
+
+    servo: str = parameter(
+        "rig",
+        "servos that really turn the head: those of rig.yaml (rig), or all of one kind",
+        choices=("rig", *PRESETS),
+        read_only=True,
+    )
+    dead_band_scale: float = parameter(
+        1.0, "real dead band of every servo, as a multiple of the described one", minimum=0, maximum=20, read_only=True
+    )
+    speed_scale: float = parameter(
+        1.0, "real speed of every servo, as a multiple of the described one", minimum=0.01, maximum=20, read_only=True
+    )
+    angle_scale: float = parameter(
+        1.0, "real angle of every joint, as a multiple of the commanded one", minimum=0.5, maximum=2, read_only=True
+    )
+    pan_left_zero_rad: float = parameter(
+        0.0, "real angle of the left pan at a command of 0", unit="rad", minimum=-0.3, maximum=0.3, read_only=True
+    )
+    pan_right_zero_rad: float = parameter(
+        0.0, "real angle of the right pan at a command of 0", unit="rad", minimum=-0.3, maximum=0.3, read_only=True
+    )
+    tilt_zero_rad: float = parameter(
+        0.0, "real angle of the tilt at a command of 0", unit="rad", minimum=-0.3, maximum=0.3, read_only=True
+    )
+
+    def plant(self, rig: Rig) -> Plant:
+        """Return the plant that these describe."""
+        return Plant(
+            servo=None if self.servo == "rig" else PRESETS[self.servo],
+            dead_band_scale=self.dead_band_scale,
+            speed_scale=self.speed_scale,
+            angle_scale=self.angle_scale,
+            zero_rad={name: float(getattr(self, f"{name}_zero_rad")) for name in JOINT_NAMES},
+        )
+
+
+GROUPS: Groups = (
+    ("", PhotoParameters),
+    ("plant.", PlantParameters),
+    ("camera.", CameraParameters),
+    ("left_camera.", LeftCameraParameters),
+    ("right_camera.", RightCameraParameters),
+)
+
+
+def sim_parameters(
+    photo: PhotoParameters, camera: CameraParameters, left: LeftCameraParameters, right: RightCameraParameters
+) -> SimParameters:
+    """Return the imperfections of the cameras as the simulator's parts take them, the preset applied."""
+    simulation = SimulationParameters(
+        rig=photo.rig, preset=photo.preset, seed=photo.seed, joint_rate_hz=photo.joint_rate_hz
+    )
+    return SimParameters(simulation=simulation, camera=camera, left_camera=left, right_camera=right).effective()
