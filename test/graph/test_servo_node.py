@@ -1,6 +1,8 @@
 """servo_node as a real node over a fake sysfs tree: topics and services in, pulse widths out."""
 
 import math
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -206,7 +208,7 @@ def test_a_trajectory_is_interpolated(make_graph: Callable[..., Graph]):
 @pytest.mark.parametrize(
     ("command", "text"),
     [
-        ({"neck": 0.1}, "joint is 'neck'"),
+        ({"neck": 0.1}, "got 'neck'"),
         ({"tilt": math.nan}, "nan"),
         ({"tilt": 0.1, "stamp_s": 1.0}, "s old"),
         ({"tilt": 0.1, "stamp_s": 2.1e9}, "ahead"),
@@ -250,7 +252,7 @@ def test_the_real_resolution_is_published_to_late_joiners(make_graph: Callable[.
 
 
 def test_a_failing_channel_is_reported_and_recovers(make_graph: Callable[..., Graph], tmp_path: Path):
-    graph = make_graph(retry_first_s=0.05, retry_longest_s=0.1)
+    graph = make_graph(**{"retry.first_s": 0.05, "retry.longest_s": 0.1})
     graph.drive(pan_left=0.2, tilt=0.2)
     (graph.chip / "pwm0").rename(tmp_path / "gone")
     graph.until(
@@ -296,6 +298,16 @@ def test_time_outs_change_while_running(make_graph: Callable[..., Graph]):
     assert not graph.node.set_parameters_atomically([Parameter("backend", value="fake")]).successful
 
 
+def test_servo_node_needs_no_opencv():
+    code = "import sys, vergence_servo.ros.servo_node; sys.exit('cv2' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_renamed_parameter_is_named(make_graph: Callable[..., Graph]):
+    with pytest.raises(ParameterError, match=r"'retry_first_s' was renamed: set 'retry\.first_s' \(in s\)"):
+        make_graph(retry_first_s=1.0)
+
+
 @pytest.mark.parametrize(
     ("overrides", "kind", "text"),
     [
@@ -304,7 +316,7 @@ def test_time_outs_change_while_running(make_graph: Callable[..., Graph]):
         ({"joints": ["neck"], "park_rad": [0.0]}, ValueError, "'neck' has no servo"),
         ({"joints": ["tilt"]}, ParameterError, "park_rad"),
         ({"speed": 1.0}, ParameterError, "there is no parameter 'speed'"),
-        ({"kernel_pwm.chip": 7}, DriverUnavailableError, "allowed is one of 0"),
+        ({"kernel_pwm.chip": 7}, DriverUnavailableError, "must be one of 0"),
     ],
 )
 def test_configurations_that_cannot_be_end_the_node(

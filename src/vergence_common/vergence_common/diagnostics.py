@@ -1,22 +1,15 @@
 """A node's health on /diagnostics, once a second, from small functions that each report on one thing."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-OK, WARN, ERROR, STALE = 0, 1, 2, 3
+from vergence_rig.report import ERROR, OK, STALE, WARN, Report
+
+__all__ = ["ERROR", "OK", "STALE", "WARN", "Diagnostics", "Report"]
+
 PERIOD_S = 1.0
-
-
-@dataclass(frozen=True)
-class Report:
-    """One status: level (OK, WARN, ERROR, STALE), a sentence, and figures by name."""
-
-    level: int
-    message: str
-    values: Mapping[str, object] = field(default_factory=dict)
 
 
 class Diagnostics:
@@ -31,7 +24,7 @@ class Diagnostics:
         self._timer = node.create_timer(PERIOD_S, self.publish)
 
     def add(self, name: str, report: Callable[[], Report]) -> None:
-        """Ask `report` for its state at every publication. A second source of one name replaces the first."""
+        """Call `report` at every publication. A second source of the same name replaces the first."""
         self._sources[name] = report
 
     def collect(self) -> dict[str, Report]:
@@ -51,7 +44,7 @@ class Diagnostics:
         self._publisher.publish(self._message)
 
     def _status(self, name: str, report: Report) -> DiagnosticStatus:
-        """Return the status, made once per name and set of figures: making messages anew costs most of a report."""
+        """Return the status, made once per name and set of values, because building messages is slow."""
         status = self._statuses.get(name)
         if status is None or [entry.key for entry in status.values] != list(report.values):
             status = self._statuses[name] = DiagnosticStatus(

@@ -1,4 +1,4 @@
-"""A DDS domain that nobody else on this machine uses, for runs that must not hear one another."""
+"""A DDS domain that no other run on this machine uses, so that simultaneous runs stay isolated."""
 
 import fcntl
 import os
@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-# DDS derives UDP ports from the domain; above 101 they run into those that Linux hands out to clients.
+# DDS derives UDP ports from the domain; above 101 they collide with the ephemeral ports of Linux.
 _DOMAINS = range(1, 102)
 
 
 class NoDomainError(RuntimeError):
-    """Every domain is taken."""
+    """Every domain is reserved."""
 
 
 @contextmanager
@@ -21,7 +21,7 @@ def own_domain(lock_dir: Path | None = None) -> Iterator[int]:
     """Reserve a domain for the block: a ROS_DOMAIN_ID that no other block on this machine has at the same time.
 
     A lock on a file per domain holds it, so that it is free again however the process ends. Raises NoDomainError where
-    all are taken.
+    all are reserved.
     """
     folder = lock_dir or Path(tempfile.gettempdir()) / "vergence_domains"
     folder.mkdir(mode=0o777, parents=True, exist_ok=True)
@@ -40,4 +40,4 @@ def own_domain(lock_dir: Path | None = None) -> Iterator[int]:
         finally:
             os.close(handle)
         return
-    raise NoDomainError(f"all {len(_DOMAINS)} DDS domains are taken: see {folder}")
+    raise NoDomainError(f"all {len(_DOMAINS)} DDS domains are reserved: see {folder}")

@@ -1,4 +1,8 @@
-"""Image messages to numpy and back, with the checks that a stranger's publisher makes necessary."""
+"""Image messages to numpy arrays and back, with checks of every field of a message.
+
+This is the only module of the package that needs OpenCV (python3-opencv): packages that use images depend on it
+themselves, so that a machine which only drives servos need not install it.
+"""
 
 import array
 import sys
@@ -15,7 +19,7 @@ _CHANNELS = {"bgr8": 3, "rgb8": 3, "mono8": 1}
 
 
 class ImageError(ValueError):
-    """An image message that cannot be used: names the field, its value and what is allowed."""
+    """An invalid image message: the error names the field, what it must be, and its value."""
 
 
 def image_to_array(message: Image) -> Array:
@@ -29,18 +33,18 @@ def image_to_array(message: Image) -> Array:
         own data, which must not be written to; rgb8 is converted.
 
     Raises:
-        ImageError: another encoding, an empty image, or a step or length that does not fit.
+        ImageError: another encoding, an empty image, or a wrong step or length.
     """
     channels = _CHANNELS.get(message.encoding)
     if channels is None:
-        raise ImageError(f"encoding is {message.encoding!r}: allowed is one of {', '.join(map(repr, _CHANNELS))}")
+        raise ImageError(f"encoding must be one of {', '.join(map(repr, _CHANNELS))}: got {message.encoding!r}")
     height, width, step = message.height, message.width, message.step
     if height == 0 or width == 0:
-        raise ImageError(f"size is {width}x{height}: allowed is at least 1x1")
+        raise ImageError(f"size must be at least 1x1: got {width}x{height}")
     if step < width * channels:
-        raise ImageError(f"step is {step}: allowed is at least {width * channels} ({width} px of {channels} bytes)")
+        raise ImageError(f"step must be at least {width * channels} ({width} px of {channels} bytes): got {step}")
     if len(message.data) != step * height:
-        raise ImageError(f"data has {len(message.data)} bytes: allowed is {step * height} ({height} rows of {step})")
+        raise ImageError(f"data must have {step * height} bytes ({height} rows of {step}): got {len(message.data)}")
     rows: Array = np.frombuffer(message.data, dtype=np.uint8).reshape(height, step)
     if channels == 1:
         return rows[:, :width]
@@ -68,7 +72,9 @@ def array_to_image(pixels: Array, header: Header, encoding: str = "bgr8") -> Ima
     channels = _CHANNELS.get(encoding)
     expected = (2,) if channels == 1 else (3,)
     if channels is None or pixels.dtype != np.uint8 or (pixels.ndim,) != expected or pixels.shape[2:] not in ((), (3,)):
-        raise ImageError(f"pixels are {pixels.shape} {pixels.dtype}: they do not fit encoding {encoding!r}")
+        raise ImageError(
+            f"pixels must be uint8 of the shape of encoding {encoding!r}: got {pixels.dtype} {pixels.shape}"
+        )
     message = Image(header=header, height=pixels.shape[0], width=pixels.shape[1], encoding=encoding)
     message.step = pixels.shape[1] * channels
     message.is_bigendian = int(sys.byteorder == "big")
@@ -82,7 +88,7 @@ def array_to_image(pixels: Array, header: Header, encoding: str = "bgr8") -> Ima
 def compressed_to_array(message: CompressedImage) -> Array:
     """Return the pixels of a JPEG or PNG message: uint8 (h, w, 3) BGR. Raises ImageError where it cannot be decoded."""
     if len(message.data) == 0:
-        raise ImageError("compressed data has 0 bytes: allowed is a whole JPEG or PNG")
+        raise ImageError("compressed data must be a whole JPEG or PNG: got 0 bytes")
     pixels = cv2.imdecode(np.frombuffer(message.data, dtype=np.uint8), cv2.IMREAD_COLOR)
     if pixels is None:
         raise ImageError(f"compressed data of {len(message.data)} bytes (format {message.format!r}) cannot be decoded")

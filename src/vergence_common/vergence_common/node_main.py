@@ -36,7 +36,7 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
     try:
         if stop_asked.is_set():
             return 0
-        # First the executor: one that is made after the shutdown leaves a complaint of its own behind.
+        # The executor is made first: after a shutdown its constructor would log an error.
         executor = SingleThreadedExecutor()
         node = make_node()
         executor.add_node(node)
@@ -45,7 +45,7 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
         pass
     except Exception as error:
         if stop_asked.is_set() or not rclpy.ok():
-            return 0  # the context was shut down under us; what failed then only noticed it
+            return 0  # the context was shut down meanwhile: the failure is its consequence
         if node is None and isinstance(error, (ValueError, OSError)):
             return _bad_input(error)
         raise

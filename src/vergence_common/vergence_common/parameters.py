@@ -91,7 +91,7 @@ def declare(node: Node, groups: Groups, allow_prefixes: tuple[str, ...] = ()) ->
         }
         values[prefix] = _named(prefix, partial(group.from_mapping, given))
     if len(values) != len(groups):
-        raise ValueError("two parameter groups have the same prefix")
+        raise ValueError("parameter groups must have different prefixes")
 
     for prefix, instance in values.items():
         for spec in instance.specs():

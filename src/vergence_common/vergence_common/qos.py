@@ -1,4 +1,4 @@
-"""QoS profiles of the contract, and mismatches as named diagnostics on both sides."""
+"""The QoS profiles, and a diagnostic that names every incompatible publisher and subscriber."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -46,7 +46,7 @@ class QosWatch:
         """As Node.create_publisher, overridable and watched; `matched` is called when a subscriber comes or goes."""
 
         def mismatch(event: QoSOfferedIncompatibleQoSInfo) -> None:
-            self._count(topic, "a subscriber asks for more than is offered", event.last_policy_kind)
+            self._count(topic, "a subscriber requests more than the publisher offers", event.last_policy_kind)
 
         return self._node.create_publisher(
             message_type,
@@ -62,7 +62,7 @@ class QosWatch:
         """As Node.create_subscription, overridable and watched."""
 
         def mismatch(event: QoSRequestedIncompatibleQoSInfo) -> None:
-            self._count(topic, "a publisher offers less than is asked for", event.last_policy_kind)
+            self._count(topic, "a publisher offers less than the subscriber requests", event.last_policy_kind)
 
         return self._node.create_subscription(
             message_type,
@@ -76,7 +76,7 @@ class QosWatch:
     def report(self) -> Report:
         """Return the diagnostic: every mismatch seen since the start, by topic and policy."""
         if not self._mismatches:
-            return Report(OK, "every publisher and subscriber fits")
+            return Report(OK, "all QoS profiles are compatible")
         return Report(WARN, "; ".join(self._mismatches), dict(self._mismatches))
 
     def _count(self, topic: str, what: str, policy: int) -> None:

@@ -1,4 +1,4 @@
-"""Which commands are taken, how trajectories run, and who commands."""
+"""Which commands are accepted, how trajectories run, and which nodes command."""
 
 import math
 from typing import Any
@@ -65,9 +65,9 @@ def test_whatever_is_taken_is_finite_and_known(names: list[str], positions: list
 
 
 def test_stale_and_future_stamps_are_refused(stamps: StampGuard):
-    with pytest.raises(StaleCommandError, match=r"0\.600 s old"):
+    with pytest.raises(StaleCommandError, match=r"got 0\.600 s"):
         stamps.check(100 * S, 100 * S + 6 * S // 10)
-    with pytest.raises(StaleCommandError, match=r"0\.200 s ahead"):
+    with pytest.raises(StaleCommandError, match=r"ahead: got 0\.200 s"):
         stamps.check(100 * S + 2 * S // 10, 100 * S)
     stamps.check(100 * S, 100 * S + S // 10)
 
@@ -115,10 +115,10 @@ def test_velocities_make_a_cubic():
         ([], [TrajectoryPoint(1.0, ())], "joint_names"),
         (["tilt", "tilt"], [TrajectoryPoint(1.0, (0.0, 0.0))], "once"),
         (["neck"], [TrajectoryPoint(1.0, (0.0,))], "'neck'"),
-        (["tilt"], [], "no points"),
-        (["tilt"], [TrajectoryPoint(1.0, (0.0,)), TrajectoryPoint(1.0, (0.0,))], "rising"),
-        (["tilt"], [TrajectoryPoint(-1.0, (0.0,))], "rising"),
-        (["tilt"], [TrajectoryPoint(1.0, (0.0, 1.0))], "2 positions"),
+        (["tilt"], [], "got none"),
+        (["tilt"], [TrajectoryPoint(1.0, (0.0,)), TrajectoryPoint(1.0, (0.0,))], "must increase"),
+        (["tilt"], [TrajectoryPoint(-1.0, (0.0,))], "must increase"),
+        (["tilt"], [TrajectoryPoint(1.0, (0.0, 1.0))], "got 2"),
         (["tilt"], [TrajectoryPoint(1.0, (math.nan,))], "finite"),
         (["tilt"], [TrajectoryPoint(1.0, (0.0,), (math.inf,))], "velocities"),
     ],

@@ -4,9 +4,12 @@ from collections.abc import Callable
 
 import pytest
 
+from vergence_rig.parameters import ParameterError
+from vergence_servo.drivers import registry
 from vergence_servo.drivers.fake import FakeDriver, FakeParameters
-from vergence_servo.drivers.protocol import ChannelError, DriverUnavailableError
-from vergence_servo.drivers.registry import check_name, open_driver
+from vergence_servo.drivers.protocol import Backend, ChannelError, DriverUnavailableError
+from vergence_servo.drivers.registry import backend_names, find_backend, open_driver, register_backend
+from vergence_servo.parameters import ServoNodeParameters, parameter_groups
 
 
 def test_fake_servos_take_their_time():
@@ -38,6 +41,26 @@ def test_fake_keeps_the_protocol(make: Callable[[], FakeDriver]):
 
 def test_gpiozero_is_refused_with_the_reason():
     with pytest.raises(DriverUnavailableError, match="11 positions"):
-        check_name("gpiozero")
-    with pytest.raises(DriverUnavailableError, match="allowed is one of fake, kernel_pwm, pca9685, pigpio, lgpio"):
+        find_backend("gpiozero")
+    with pytest.raises(DriverUnavailableError, match="must be one of fake, kernel_pwm, pca9685, pigpio, lgpio"):
         open_driver("arduino")
+
+
+def test_a_registered_driver_is_a_choice_and_has_its_parameters(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(registry, "_BACKENDS", dict(registry._BACKENDS))
+    with pytest.raises(ParameterError, match="backend"):
+        ServoNodeParameters(backend="mine", servos="servos.yaml")
+    register_backend(Backend("mine", FakeParameters, FakeDriver))
+    assert ServoNodeParameters(backend="mine", servos="servos.yaml").backend == "mine"
+    assert ("mine.", FakeParameters) in parameter_groups()
+    assert isinstance(open_driver("mine", {"channels": 3}), FakeDriver)
+    with pytest.raises(ParameterError, match="servos"):
+        ServoNodeParameters(backend="mine")
+
+
+@pytest.mark.parametrize("name", ["fake", "gpiozero"])
+def test_a_name_in_use_is_not_registered_again(name: str):
+    before = backend_names()
+    with pytest.raises(ValueError, match="must be new"):
+        register_backend(Backend(name, FakeParameters, FakeDriver))
+    assert backend_names() == before

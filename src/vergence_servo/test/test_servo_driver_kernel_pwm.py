@@ -48,7 +48,7 @@ class SysfsPwm:
 @pytest.fixture(autouse=True)
 def udev_patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Longer than a slow machine's thread takes to make a channel."""
-    monkeypatch.setattr(kernel_pwm, "_UDEV_PATIENCE_S", 60.0)
+    monkeypatch.setattr(kernel_pwm, "_UDEV_TIMEOUT_S", 60.0)
 
 
 @pytest.fixture
@@ -76,7 +76,7 @@ def test_kernel_pwm_refuses_channels_and_pulses_that_cannot_be(sysfs: SysfsPwm, 
     driver = KernelPwmDriver(KernelPwmParameters(root=str(tmp_path)))
     with pytest.raises(ChannelError, match="0 to 3"):
         driver.set_pulse_us(4, 1500.0)
-    with pytest.raises(DriverIoError, match="does not fit"):
+    with pytest.raises(DriverIoError, match="must be above 0 and below"):
         driver.set_pulse_us(0, 30_000.0)
     driver.release(1)  # never exported: nothing to release
 
@@ -118,14 +118,14 @@ def test_kernel_pwm_finds_the_chip_of_the_header(tmp_path: Path):
     assert header.read(0, "enable") == 1
     KernelPwmDriver(KernelPwmParameters(root=str(tmp_path), chip=0)).set_pulse_us(1, 1500.0)
     assert fan.read(1, "enable") == 1
-    with pytest.raises(DriverUnavailableError, match="allowed is one of 0, 2"):
+    with pytest.raises(DriverUnavailableError, match="must be one of 0, 2"):
         KernelPwmDriver(KernelPwmParameters(root=str(tmp_path), chip=1))
     header.close()
     fan.close()
 
 
 def test_kernel_pwm_names_the_device_tree_line_and_the_group(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(kernel_pwm, "_UDEV_PATIENCE_S", 0.05)
+    monkeypatch.setattr(kernel_pwm, "_UDEV_TIMEOUT_S", 0.05)
     with pytest.raises(DriverUnavailableError, match=r"dtoverlay=pwm-2chan,pin=12,func=4,pin2=13,func2=4"):
         KernelPwmDriver(KernelPwmParameters(root=str(tmp_path)))
     chip = tmp_path / "pwmchip0"
@@ -140,7 +140,7 @@ def test_kernel_pwm_permission_names_the_group(sysfs: SysfsPwm, tmp_path: Path, 
     def refuse(*_: Any, **__: Any) -> Any:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(kernel_pwm, "_UDEV_PATIENCE_S", 0.05)
+    monkeypatch.setattr(kernel_pwm, "_UDEV_TIMEOUT_S", 0.05)
     driver = KernelPwmDriver(KernelPwmParameters(root=str(tmp_path)))
     monkeypatch.setattr("builtins.open", refuse)
     with pytest.raises(DriverIoError, match="usermod -aG gpio"):

@@ -14,7 +14,7 @@ from vergence_servo.calibration import default_servos, servo_limits
 from vergence_servo.command_guard import CommandRefusedError, DisabledError, UnknownJointError
 from vergence_servo.drivers.fake import FakeDriver, FakeParameters
 from vergence_servo.drivers.protocol import DriverIoError
-from vergence_servo.servo_channel import ChannelState
+from vergence_servo.servo_channel import ChannelState, RetryParameters
 from vergence_servo.servo_head import HeadParameters, Mode, ServoHead
 from vergence_servo.trajectory import Trajectory, TrajectoryPoint
 
@@ -47,11 +47,19 @@ class Wires(FakeDriver):
 class Bench:
     """A head on wires, moved on by hand."""
 
-    def __init__(self, resolution_us: float = 1.0, believed_rad: dict[str, float] | None = None, **changes: Any):
+    def __init__(
+        self,
+        resolution_us: float = 1.0,
+        initial_rad: dict[str, float] | None = None,
+        retry: RetryParameters | None = None,
+        **changes: Any,
+    ):
         rig = default_rig()
         self.limits = {name: servo_limits(name, servo, rig.joints[name]) for name, servo in default_servos().items()}
         self.wires = Wires(resolution_us)
-        self.head = ServoHead(self.wires, self.limits, HeadParameters(**changes), believed_rad or {}, self.wires.now_s)
+        self.head = ServoHead(
+            self.wires, self.limits, HeadParameters(**changes), initial_rad or {}, self.wires.now_s, retry
+        )
 
     def run(self, duration_s: float) -> None:
         for _ in range(round(duration_s / TICK_S)):
@@ -99,8 +107,8 @@ def test_servos_start_one_after_the_other():
     assert [later - earlier for earlier, later in itertools.pairwise(firsts)] == pytest.approx([0.2, 0.2])
 
 
-def test_the_first_pulse_is_where_the_servo_is_believed_to_be():
-    bench = Bench(believed_rad={"pan_left": 0.5})
+def test_the_first_pulse_is_where_the_servo_is_initial_to_be():
+    bench = Bench(initial_rad={"pan_left": 0.5})
     bench.keep(0.5, pan_left=-0.5)
     assert bench.wires.written[0][2] == pytest.approx(1500 + math.degrees(0.5) / 0.09, abs=0.5)
 
@@ -184,7 +192,7 @@ def test_parking_at_the_end_leaves_limp_servos_limp():
 
 
 def test_a_failed_channel_stops_alone_and_is_tried_again_less_and_less_often():
-    bench = Bench(retry_first_s=0.5, retry_longest_s=2.0, stagger_s=0.0)
+    bench = Bench(retry=RetryParameters(first_s=0.5, longest_s=2.0), stagger_s=0.0)
     bench.keep(0.5, pan_left=0.1, tilt=0.1)
     bench.wires.cut = {0}
     bench.keep(0.1, pan_left=0.2, tilt=0.2)
@@ -203,7 +211,7 @@ def test_a_failed_channel_stops_alone_and_is_tried_again_less_and_less_often():
 
 
 def test_a_release_that_fails_is_repeated_until_it_holds():
-    bench = Bench(retry_first_s=0.2)
+    bench = Bench(retry=RetryParameters(first_s=0.2))
     bench.keep(0.5, pan_left=0.1)
     bench.wires.cut = {0}
     bench.head.release(bench.wires.now_s)
@@ -230,8 +238,8 @@ def test_unknown_joints_and_poses_that_do_not_fit_are_refused():
         Bench().command(neck=0.1)
     with pytest.raises(ParameterError, match="park_rad"):
         Bench(park_rad=(0.0, 0.0))
-    with pytest.raises(ParameterError, match="retry_longest_s"):
-        HeadParameters(retry_first_s=2.0, retry_longest_s=1.0)
+    with pytest.raises(ParameterError, match="longest_s"):
+        RetryParameters(first_s=2.0, longest_s=1.0)
 
 
 @settings(deadline=None, max_examples=60)
@@ -244,13 +252,13 @@ def test_unknown_joints_and_poses_that_do_not_fit_are_refused():
         ),
         max_size=40,
     ),
-    believed=st.dictionaries(st.sampled_from(["pan_left", "tilt"]), st.floats(-9, 9)),
+    initial=st.dictionaries(st.sampled_from(["pan_left", "tilt"]), st.floats(-9, 9)),
     resolution_us=st.sampled_from([0.02, 1.0, 4.88, 5.0]),
 )
 def test_no_history_makes_the_head_send_an_unsafe_pulse(
-    acts: list[tuple[str, dict[str, float], float]], believed: dict[str, float], resolution_us: float
+    acts: list[tuple[str, dict[str, float], float]], initial: dict[str, float], resolution_us: float
 ):
-    bench = Bench(resolution_us, believed, stagger_s=0.02, retry_first_s=0.05, release_timeout_s=0.3)
+    bench = Bench(resolution_us, initial, RetryParameters(first_s=0.05), stagger_s=0.02, release_timeout_s=0.3)
     head, wires = bench.head, bench.wires
     for act, positions, pause_s in acts:
         wires.now_s += pause_s  # clocks may even step back

@@ -102,5 +102,5 @@ def test_after_a_rest_a_move_begins_with_one_pulse_period():
 
 def test_a_grid_coarser_than_the_limits_is_refused():
     limits = ServoLimits(ServoCalibration(channel=0), 1501.0, 1504.0, 1.0)
-    with pytest.raises(ValueError, match="resolution_us is 10"):
+    with pytest.raises(ValueError, match=r"resolution_us must .* got 10"):
         safe_pulse_us(0.0, 1500.0, 0.1, limits, 10.0)

@@ -1,7 +1,7 @@
-"""What is known of each servo's wiring and mounting (servos.yaml), and pulses to angles and back.
+"""Wiring, mounting and pulses of each servo (servos.yaml), and the conversion of pulses to angles and back.
 
-The joint angle [rad] is the one on the topics. The shaft angle is what the pulse says: shaft = sign * joint + trim.
-Pulses are known at two or more shaft angles; between them they are interpolated, beyond them the end segments go on.
+The joint angle [rad] is the one on the topics. The pulse sets the shaft angle: shaft = sign * joint + trim.
+Pulses are measured at two or more shaft angles, interpolated between them, and extrapolated beyond them.
 """
 
 import bisect
@@ -22,35 +22,39 @@ _PLAUSIBLE_US_PER_RAD = (150.0, 4000.0)
 
 
 class ServoCalibrationError(ValueError):
-    """A servos.yaml that cannot be: names file, servo, key, value and what is allowed."""
+    """An invalid servos.yaml: the message names file, servo, key, what it must be, and the value."""
 
 
 @dataclass(frozen=True)
 class ServoCalibration(Parameters):
-    """One servo: where it is wired, how its pulses relate to angles, and what it may do."""
+    """One servo: its channel, its pulses at known angles, and its limits."""
 
-    channel: int = parameter(REQUIRED, "the backend's channel, or GPIO number", minimum=0, maximum=63)
-    model: str = parameter("custom", "what the servo is called: sg90 and mg995 are presets")
+    channel: int = parameter(
+        REQUIRED, "channel of the backend, or GPIO number, that the servo is wired to", minimum=0, maximum=63
+    )
+    model: str = parameter("custom", "model of the servo: sg90 and mg995 are presets of speed, dead band and backlash")
     angles_rad: tuple[float, ...] = parameter(
-        (-60.0 * _DEG, 60.0 * _DEG), "known shaft angles, rising", unit="rad", minimum=-math.pi, maximum=math.pi
+        (-60.0 * _DEG, 60.0 * _DEG), "measured shaft angles, increasing", unit="rad", minimum=-math.pi, maximum=math.pi
     )
     pulses_us: tuple[float, ...] = parameter(
-        (2500.0 / 3.0, 6500.0 / 3.0), "the pulse at each of them, rising", unit="us", minimum=300, maximum=2700
+        (2500.0 / 3.0, 6500.0 / 3.0), "pulse at each of angles_rad, increasing", unit="us", minimum=300, maximum=2700
     )
-    sign: int = parameter(1, "-1 where the servo is mounted so that longer pulses turn the joint the other way")
+    sign: int = parameter(1, "1, or -1 where longer pulses turn the joint towards smaller angles")
     trim_rad: float = parameter(0.0, "shaft angle at joint angle 0", unit="rad", minimum=-math.pi, maximum=math.pi)
-    minimum_us: float = parameter(600.0, "no pulse is ever shorter", unit="us", minimum=300, maximum=2700)
-    maximum_us: float = parameter(2400.0, "no pulse is ever longer", unit="us", minimum=300, maximum=2700)
-    lower_rad: float = parameter(-60.0 * _DEG, "soft limit of the joint", unit="rad", minimum=-math.pi, maximum=math.pi)
-    upper_rad: float = parameter(60.0 * _DEG, "soft limit of the joint", unit="rad", minimum=-math.pi, maximum=math.pi)
-    speed_rad_s: float = parameter(600.0 * _DEG, "the servo's own speed", unit="rad/s", minimum=0.01, maximum=100)
-    dead_band_rad: float = parameter(
-        0.75 * _DEG, "full width in which the motor does not turn", unit="rad", minimum=0, maximum=0.2
+    minimum_us: float = parameter(600.0, "shortest pulse that is sent", unit="us", minimum=300, maximum=2700)
+    maximum_us: float = parameter(2400.0, "longest pulse that is sent", unit="us", minimum=300, maximum=2700)
+    lower_rad: float = parameter(
+        -60.0 * _DEG, "lower limit of the joint", unit="rad", minimum=-math.pi, maximum=math.pi
     )
-    backlash_rad: float = parameter(0.3 * _DEG, "full width of the gears' play", unit="rad", minimum=0, maximum=0.2)
+    upper_rad: float = parameter(60.0 * _DEG, "upper limit of the joint", unit="rad", minimum=-math.pi, maximum=math.pi)
+    speed_rad_s: float = parameter(600.0 * _DEG, "largest speed of the servo", unit="rad/s", minimum=0.01, maximum=100)
+    dead_band_rad: float = parameter(
+        0.75 * _DEG, "full width of the servo's dead band", unit="rad", minimum=0, maximum=0.2
+    )
+    backlash_rad: float = parameter(0.3 * _DEG, "full width of the gears' backlash", unit="rad", minimum=0, maximum=0.2)
 
     def check(self) -> None:
-        """Refuse what no servo can be."""
+        """See Parameters."""
         if len(self.angles_rad) < 2 or any(b - a < 0.01 for a, b in zip(self.angles_rad, self.angles_rad[1:])):  # noqa: B905
             raise ParameterError(
                 "angles_rad", self.angles_rad, "a list of two or more, each 0.01 or more above the last [rad]"
@@ -113,15 +117,16 @@ def _preset(spec: ServoSpec) -> dict[str, Any]:
 
 
 PRESETS: dict[str, dict[str, Any]] = {spec.name: _preset(spec) for spec in (SG90, MG995)}
-"""What `model: sg90` or `mg995` fills in: speed, dead band and backlash. Both turn 0.09 degree per us, roughly: every
-specimen differs, hence calibrate_servos."""
+"""What `model: sg90` or `mg995` fills in: speed, dead band and backlash. Both turn about 0.09 degree per us; specimens
+differ, hence calibrate_servos."""
 
 DEFAULT: dict[str, dict[str, Any]] = {
     "pan_left": {"channel": 0, "model": "sg90"},
     "pan_right": {"channel": 1, "model": "sg90"},
     "tilt": {"channel": 2, "model": "mg995", "lower_rad": -45.0 * _DEG, "upper_rad": 45.0 * _DEG},
 }
-"""The built-in servos, equal to config/servos.yaml. Its channels suit no wiring but its own: only `fake` takes it."""
+"""The built-in servos, equal to config/servos.yaml. Its channels match no real wiring: it serves only drivers without
+hardware."""
 
 
 def servos_from_mapping(document: Any) -> dict[str, ServoCalibration]:
@@ -171,7 +176,7 @@ def _short(value: object) -> str:
 
 @dataclass(frozen=True)
 class ServoLimits:
-    """What one servo may ever be sent: pulses [us] within both its own and its joint's limits, and a speed [rad/s]."""
+    """Limits of one servo: pulses [us] within both its own and its joint's limits, and a speed [rad/s]."""
 
     calibration: ServoCalibration
     minimum_us: float
@@ -203,6 +208,6 @@ def servo_limits(name: str, calibration: ServoCalibration, joint: JointSpec | No
     if lower >= upper or low_us >= high_us:
         raise ServoCalibrationError(
             f"servos.{name}: its pulses of {calibration.minimum_us:g} to {calibration.maximum_us:g} us, its soft "
-            f"limits and the rig's joint limits ({lower:.3f} to {upper:.3f} rad) leave nothing to move in"
+            f"limits and the rig's joint limits ({lower:.3f} to {upper:.3f} rad) leave no range of motion"
         )
     return ServoLimits(calibration, low_us, high_us, speed)

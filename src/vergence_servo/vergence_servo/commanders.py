@@ -1,4 +1,4 @@
-"""Who commands the servos: two at once are a mistake that nobody else would notice."""
+"""Which nodes command the servos: two at once are a mistake that no single node can detect."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -29,6 +29,6 @@ def conflict(publishers: Mapping[str, Iterable[Commander]]) -> str:
         return ""
     places = [f"{commander.node} on {topic}" for topic, commanders in publishers.items() for commander in commanders]
     return (
-        f"{len(nodes)} commanders at once: {', '.join(sorted(places))}; the servos obey both in turn "
-        f"(one that was killed is listed for 10 s more)"
+        f"{len(nodes)} commanders at once: {', '.join(sorted(places))}; the servos follow both in turn "
+        f"(a killed node stays listed for 10 s)"
     )

@@ -1,7 +1,7 @@
 """A small process that releases the servos if servo_node dies without doing so.
 
 Hardware PWM, a PCA9685 and a pigpio daemon go on pulsing when the process that set them is killed. The guardian holds
-the other end of a pipe: when the pipe ends without a farewell, it opens the backend itself and stops every channel.
+the other end of a pipe: when the pipe ends without the dismissal message, it opens the backend and stops every channel.
 It cannot help where the whole computer stops: docs/servos.md says what can.
 """
 
@@ -17,11 +17,11 @@ from typing import Any
 from vergence_servo.drivers.protocol import DriverIoError
 from vergence_servo.drivers.registry import open_driver
 
-_FAREWELL = b"released\n"
+_DISMISSAL = b"released\n"
 
 
 class Guardian:
-    """The guarded process's side. A context is not needed: the end of this process is what the guardian waits for."""
+    """The guarded process's side. It needs no context manager: the guardian acts when this process ends."""
 
     def __init__(self, backend: str, values: Mapping[str, Any], channels: Sequence[int]) -> None:
         """Start the guardian of these channels of a backend with these parameters. Raises OSError."""
@@ -33,13 +33,13 @@ class Guardian:
 
     @property
     def alive(self) -> bool:
-        """True while the guardian waits."""
+        """True while the guardian runs."""
         return self._process.poll() is None
 
     def dismiss(self) -> None:
-        """Tell the guardian that all is released, and wait for its end."""
+        """End the guardian without an action, after all servos have been released."""
         try:
-            self._process.communicate(_FAREWELL, timeout=5.0)
+            self._process.communicate(_DISMISSAL, timeout=5.0)
         except (BrokenPipeError, ValueError):
             self._process.wait()
         except subprocess.TimeoutExpired:
@@ -48,7 +48,7 @@ class Guardian:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Wait for the end of the pipe on standard input; release unless it ended with a farewell."""
+    """Wait for the end of the pipe on standard input; release unless it ended with the dismissal."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("backend")
     parser.add_argument("values", type=json.loads)
@@ -56,10 +56,10 @@ def main(args: Sequence[str] | None = None) -> int:
     options = parser.parse_args(args)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    heard = b""
+    received = b""
     while part := os.read(0, 4096):
-        heard = (heard + part)[-len(_FAREWELL) :]
-    if heard == _FAREWELL:
+        received = (received + part)[-len(_DISMISSAL) :]
+    if received == _DISMISSAL:
         return 0
     try:
         driver = open_driver(options.backend, options.values)

@@ -1,4 +1,4 @@
-"""The last known pose, kept across runs: without feedback it is the best guess of where the servos are."""
+"""The last pose, kept across runs: without feedback it is the best estimate of the servos' positions."""
 
 import json
 import math
@@ -10,12 +10,12 @@ from vergence_rig.atomic_file import write_atomically
 
 
 def default_pose_file() -> Path:
-    """Return where ROS keeps its own state: $ROS_HOME or ~/.ros."""
+    """Return the file's default path, in $ROS_HOME or ~/.ros."""
     return Path(os.environ.get("ROS_HOME") or Path.home() / ".ros") / "vergence_servo_pose.json"
 
 
 def read_pose(path: Path) -> dict[str, float]:
-    """Return the angles [rad] by joint; empty where there is no such file or it holds something else."""
+    """Return the angles [rad] by joint; empty where the file is missing or not valid."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,6 +1,6 @@
-"""What a servo is really sent: a pure function of what is wanted, what was sent last, and the time since.
+"""The pulse that a servo is sent: a pure function of the commanded angle, the last pulse, and the time since.
 
-For every input whatsoever its answer is a finite pulse within the servo's limits, on the backend's grid, and no
+For every input the result is a finite pulse within the servo's limits, on the backend's grid, and no
 further from the last one than the slew limit allows.
 """
 
@@ -9,7 +9,7 @@ import math
 from vergence_servo.calibration import ServoLimits
 
 _LONGEST_CREDIT_S = 0.02
-"""One pulse period: after a rest, a move starts with what a servo could travel within it, not with a leap."""
+"""One pulse period: after a rest, a move starts with what a servo could travel within it, without a jump."""
 
 
 def safe_pulse_us(
@@ -23,7 +23,7 @@ def safe_pulse_us(
     """Return the pulse to send.
 
     Args:
-        wanted_rad: the joint angle asked for; where it is not finite, the servo stays.
+        wanted_rad: the commanded joint angle; where it is not finite, the servo stays.
         last_us: the pulse sent last (or assumed, before the first) [us].
         elapsed_s: time since it was sent; negative or NaN counts as none.
         limits: of this servo.
@@ -31,8 +31,8 @@ def safe_pulse_us(
         speed_rad_s: a slower limit than the servo's own, if any.
 
     Returns:
-        A multiple of `resolution_us` within the limits, nearest to the angle wanted, unless the slew limit lets the
-        servo only get part of the way. A `last_us` outside the limits is brought back to them at once.
+        A multiple of `resolution_us` within the limits, nearest to the angle wanted, unless the slew limit allows
+        only part of the way. A `last_us` outside the limits is brought back to them at once.
     """
     lowest, highest = grid_ends(limits, resolution_us)
     inside_us = min(max(last_us, limits.minimum_us), limits.maximum_us) if math.isfinite(last_us) else limits.minimum_us
@@ -73,7 +73,7 @@ def grid_ends(limits: ServoLimits, resolution_us: float) -> tuple[int, int]:
     """
     lowest, highest = math.ceil(limits.minimum_us / resolution_us), math.floor(limits.maximum_us / resolution_us)
     if lowest > highest:
-        raise ValueError(f"resolution_us is {resolution_us}: no multiple lies within the servo's limits")
+        raise ValueError(f"resolution_us must have a multiple within the servo's limits: got {resolution_us}")
     return lowest, highest
 
 

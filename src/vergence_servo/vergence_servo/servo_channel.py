@@ -1,8 +1,9 @@
-"""One servo on one channel: released, pulsing or failed, and where it is believed to be."""
+"""One servo on one channel: released, pulsing or failed, and its estimated position."""
 
 from dataclasses import dataclass
 from enum import Enum
 
+from vergence_rig.parameters import ParameterError, Parameters, parameter
 from vergence_rig.servo import ServoPlant, ServoSpec
 from vergence_servo.calibration import ServoLimits
 from vergence_servo.drivers.protocol import DriverIoError, ServoDriver
@@ -10,7 +11,7 @@ from vergence_servo.safety import safe_pulse_us
 
 
 class ChannelState(Enum):
-    """What a channel does."""
+    """The state of a channel."""
 
     RELEASED = "released"
     PULSING = "pulsing"
@@ -18,11 +19,30 @@ class ChannelState(Enum):
 
 
 @dataclass(frozen=True)
-class BackOff:
-    """Waits between attempts at a failed channel: doubling from the first to the longest [s]."""
+class RetryParameters(Parameters):
+    """Waits between attempts at a failed channel: doubling from the first to the longest."""
 
-    first_s: float
-    longest_s: float
+    first_s: float = parameter(
+        0.5,
+        "wait before a failed servo channel is tried again; it doubles with every failure",
+        unit="s",
+        minimum=0.01,
+        maximum=60,
+        formerly="retry_first_s",
+    )
+    longest_s: float = parameter(
+        30.0,
+        "longest wait before a failed servo channel is tried again",
+        unit="s",
+        minimum=0.01,
+        maximum=3600,
+        formerly="retry_longest_s",
+    )
+
+    def check(self) -> None:
+        """See Parameters."""
+        if self.longest_s < self.first_s:
+            raise ParameterError("longest_s", self.longest_s, f"at least first_s, {self.first_s:g}")
 
 
 class ServoChannel:
@@ -34,30 +54,30 @@ class ServoChannel:
         limits: ServoLimits,
         spec: ServoSpec,
         driver: ServoDriver,
-        believed_rad: float,
-        back_off: BackOff,
+        initial_rad: float,
+        retry: RetryParameters,
         now_s: float,
     ) -> None:
         self.name = name
         self.limits = limits
-        self.back_off = back_off
+        self.retry = retry
         self.state = ChannelState.RELEASED
         self.fault = ""
         self.fault_count = 0
         self.retry_s = 0.0
         self._driver = driver
         self._channel = limits.calibration.channel
-        self._wait_s = back_off.first_s
+        self._wait_s = retry.first_s
         self._pulse_us = safe_pulse_us(
-            believed_rad, limits.calibration.pulse_us(believed_rad), 0.0, limits, driver.resolution_us
+            initial_rad, limits.calibration.pulse_us(initial_rad), 0.0, limits, driver.resolution_us
         )
         self._sent_s = now_s
-        self._well_since_s = now_s
+        self._working_since_s = now_s
         self._plant = ServoPlant(spec, self.sent_rad, now_s)
 
     @property
     def sent_rad(self) -> float:
-        """The joint angle of the pulse sent last, or believed before the first [rad]."""
+        """The joint angle of the pulse sent last, or the initial one before the first [rad]."""
         return self.limits.calibration.joint_rad(self._pulse_us)
 
     @property
@@ -66,12 +86,12 @@ class ServoChannel:
         return self._pulse_us if self.state is ChannelState.PULSING else None
 
     def modelled_rad(self, now_s: float) -> float:
-        """Return where the servo should have got to by now [rad]: hobby servos do not tell."""
+        """Return the modelled position [rad]: hobby servos do not report theirs."""
         self._plant.step(now_s)
         return self._plant.modelled_rad
 
     def attach(self, now_s: float) -> None:
-        """Begin to send pulses, where the servo is believed to be."""
+        """Begin to send pulses, at the estimated position."""
         self._send(self._pulse_us, now_s)
 
     def drive(self, wanted_rad: float, now_s: float, speed_rad_s: float) -> None:
@@ -83,11 +103,11 @@ class ServoChannel:
         )
         if pulse_us != self._pulse_us:
             self._send(pulse_us, now_s)
-        elif now_s - self._well_since_s > self._wait_s:
-            self._wait_s = self.back_off.first_s
+        elif now_s - self._working_since_s > self._wait_s:
+            self._wait_s = self.retry.first_s
 
     def arrived(self, wanted_rad: float) -> bool:
-        """Tell whether the pulse sent is the one nearest to `wanted_rad` [rad] that may be sent."""
+        """Return whether the pulse sent is the one nearest to `wanted_rad` [rad] that may be sent."""
         goal_us = safe_pulse_us(wanted_rad, self._pulse_us, 1e9, self.limits, self._driver.resolution_us)
         near_us = 1.001 * self._driver.resolution_us
         return abs(goal_us - self._pulse_us) <= near_us and abs(self._way_us(wanted_rad)) <= near_us
@@ -116,7 +136,7 @@ class ServoChannel:
                 return  # release is tried again with the next attempt
             return
         if self.state is not ChannelState.PULSING:
-            self._well_since_s = now_s
+            self._working_since_s = now_s
             self.fault = ""
         self.state = ChannelState.PULSING
         self._pulse_us, self._sent_s = pulse_us, now_s
@@ -127,4 +147,4 @@ class ServoChannel:
         self.fault = str(error)
         self.fault_count += 1
         self.retry_s = now_s + self._wait_s
-        self._wait_s = min(2 * self._wait_s, self.back_off.longest_s)
+        self._wait_s = min(2 * self._wait_s, self.retry.longest_s)

@@ -9,12 +9,12 @@ from vergence_rig.parameters import ParameterError, Parameters, parameter
 from vergence_servo.calibration import ServoLimits
 from vergence_servo.command_guard import CommandRefusedError, DisabledError, UnknownJointError
 from vergence_servo.drivers.protocol import ServoDriver
-from vergence_servo.servo_channel import BackOff, ChannelState, ServoChannel
+from vergence_servo.servo_channel import ChannelState, RetryParameters, ServoChannel
 from vergence_servo.trajectory import Trajectory
 
 
 class Mode(Enum):
-    """What the head does."""
+    """The state of the head."""
 
     DISABLED = "disabled"
     RELEASED = "released"
@@ -25,72 +25,87 @@ class Mode(Enum):
 
 @dataclass(frozen=True)
 class HeadParameters(Parameters):
-    """Time-outs, starts, parking and retries."""
+    """Time-outs, starts and parking."""
 
     command_timeout_s: float = parameter(
-        0.5, "without a command for this long the servos hold where they are", unit="s", minimum=0.01, maximum=3600
+        0.5, "without a command for this long the servos hold their position", unit="s", minimum=0.01, maximum=3600
     )
     release_timeout_s: float = parameter(
-        30.0, "after holding for this long they are released; 0 never", unit="s", minimum=0, maximum=86400
+        30.0,
+        "servos that have held for this long are released; 0 never releases them",
+        unit="s",
+        minimum=0,
+        maximum=86400,
     )
     stagger_s: float = parameter(
-        0.15, "time between the first pulses of two servos, for the supply's sake", unit="s", minimum=0, maximum=10
+        0.15,
+        "time between the first pulses of two servos, which limits the inrush current",
+        unit="s",
+        minimum=0,
+        maximum=10,
     )
     park_rad: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0), "where to park, in the order of `joints`", unit="rad", minimum=-math.pi, maximum=math.pi
+        (0.0, 0.0, 0.0),
+        "angles of the parking pose, in the order of `joints`",
+        unit="rad",
+        minimum=-math.pi,
+        maximum=math.pi,
     )
-    park_speed_rad_s: float = parameter(1.5, "speed of parking", unit="rad/s", minimum=0.05, maximum=100)
+    park_speed_rad_s: float = parameter(
+        1.5, "speed at which servos move to the parking pose", unit="rad/s", minimum=0.05, maximum=100
+    )
     park_time_limit_s: float = parameter(
-        2.0, "parking on SIGINT and SIGTERM takes no longer; then all is released", unit="s", minimum=0, maximum=30
+        2.0,
+        "longest time of parking on SIGINT and SIGTERM, after which all servos are released",
+        unit="s",
+        minimum=0,
+        maximum=30,
     )
-    retry_first_s: float = parameter(
-        0.5, "wait before a failed channel is tried again; it doubles", unit="s", minimum=0.01, maximum=60
-    )
-    retry_longest_s: float = parameter(30.0, "the longest such wait", unit="s", minimum=0.01, maximum=3600)
     command_latency_s: float = parameter(
-        0.015, "modelled time from pulse to first motion, for joint_states", unit="s", minimum=0, maximum=1
+        0.015,
+        "modelled time from a pulse to the servo's first motion, used for joint_states",
+        unit="s",
+        minimum=0,
+        maximum=1,
     )
-
-    def check(self) -> None:
-        """Refuse a longest wait shorter than the first."""
-        if self.retry_longest_s < self.retry_first_s:
-            raise ParameterError(
-                "retry_longest_s", self.retry_longest_s, f"at least retry_first_s, {self.retry_first_s:g}"
-            )
 
 
 class ServoHead:
-    """Drives the channels towards what is wanted, one `step` at a time; only safe pulses ever reach the driver."""
+    """Drives the channels towards the commanded angles, one `step` at a time; only safe pulses reach the driver."""
 
     def __init__(
         self,
         driver: ServoDriver,
         servos: Mapping[str, ServoLimits],
         parameters: HeadParameters,
-        believed_rad: Mapping[str, float],
+        initial_rad: Mapping[str, float],
         now_s: float,
+        retry: RetryParameters | None = None,
     ) -> None:
-        """Take the servos over, all released.
+        """Release all servos.
 
         Args:
             driver: the backend.
             servos: limits by joint; their order is that of `park_rad`.
-            parameters: time-outs and the like.
-            believed_rad: where joints are thought to be; 0 for those left out.
+            parameters: time-outs, starts and parking.
+            initial_rad: estimated angles of the joints; 0 for those left out.
             now_s: the time.
+            retry: waits before a failed channel is tried again.
         """
         if len(parameters.park_rad) != len(servos):
-            raise ParameterError("park_rad", parameters.park_rad, f"{len(servos)} angles, for {', '.join(servos)}")
+            raise ParameterError(
+                "park_rad", parameters.park_rad, f"a list of {len(servos)} angles, for {', '.join(servos)}"
+            )
         self._parameters = parameters
-        back_off = BackOff(parameters.retry_first_s, parameters.retry_longest_s)
+        retry = retry or RetryParameters()
         self.channels = {
             name: ServoChannel(
                 name,
                 limits,
                 limits.calibration.servo_spec(driver.resolution_us, parameters.command_latency_s),
                 driver,
-                believed_rad.get(name, 0.0),
-                back_off,
+                initial_rad.get(name, 0.0),
+                retry,
                 now_s,
             )
             for name, limits in servos.items()
@@ -101,20 +116,20 @@ class ServoHead:
         self._commanded_s = now_s
         self._next_start_s = now_s
         for channel in self.channels.values():
-            channel.release(now_s)  # a process that was killed may have left it pulsing
+            channel.release(now_s)  # a killed process may have left it pulsing
 
-    def set_parameters(self, parameters: HeadParameters) -> None:
-        """Use other time-outs from now on."""
+    def set_parameters(self, parameters: HeadParameters, retry: RetryParameters) -> None:
+        """Use other time-outs and waits from now on."""
         self._parameters = parameters
         for channel in self.channels.values():
-            channel.back_off = BackOff(parameters.retry_first_s, parameters.retry_longest_s)
+            channel.retry = retry
 
     def command(self, positions_rad: Mapping[str, float], now_s: float) -> None:
-        """Want these joints at these angles [rad]; ends a trajectory. Raises CommandRefusedError."""
+        """Move these joints to these angles [rad]; ends a trajectory. Raises CommandRefusedError."""
         self._check_enabled()
         for name in positions_rad:
             if name not in self.channels:
-                raise UnknownJointError(f"joint is {name[:60]!r}: allowed is one of {', '.join(self.channels)}")
+                raise UnknownJointError(f"joint must be one of {', '.join(self.channels)}: got {name[:60]!r}")
         self._trajectory = None
         self._begin(now_s)
         self._wanted_rad.update(positions_rad)
@@ -135,18 +150,18 @@ class ServoHead:
         self._commanded_s = now_s
 
     def enable(self, on: bool, now_s: float) -> None:
-        """Take commands again, or release everything and refuse them."""
+        """Accept commands again, or release everything and refuse them."""
         if not on:
             self._release_all(now_s, Mode.DISABLED)
         elif self.mode is Mode.DISABLED:
             self.mode = Mode.RELEASED
 
     def release(self, now_s: float) -> None:
-        """Release every servo; the next command takes them up again."""
+        """Release every servo; the next command starts them again."""
         self._release_all(now_s, Mode.DISABLED if self.mode is Mode.DISABLED else Mode.RELEASED)
 
     def park(self, now_s: float, only_pulsing: bool = False) -> None:
-        """Go slowly to the parking pose and hold there; `only_pulsing` leaves limp servos so. Raises DisabledError."""
+        """Go slowly to the parking pose and hold there; `only_pulsing` skips released ones. Raises DisabledError."""
         self._check_enabled()
         self._trajectory = None
         self._wanted_rad = {
@@ -158,14 +173,14 @@ class ServoHead:
         self._commanded_s = now_s
 
     def attach_all(self, now_s: float) -> None:
-        """Begin to hold every servo where it is believed to be. Raises DisabledError."""
+        """Begin to hold every servo at its estimated position. Raises DisabledError."""
         self._check_enabled()
         self._wanted_rad = {name: channel.sent_rad for name, channel in self.channels.items()}
         self.hold(now_s)
 
     @property
     def parked(self) -> bool:
-        """True if every servo under command that can move has been sent to where it should be."""
+        """True if every commanded servo that works has been sent to its commanded angle."""
         commanded = [(self.channels[name], wanted) for name, wanted in self._wanted_rad.items()]
         return all(channel.state is ChannelState.FAILED or channel.arrived(wanted) for channel, wanted in commanded)
 

@@ -18,7 +18,7 @@ class TrajectoryPoint:
 
 
 class Trajectory:
-    """A checked trajectory that starts from where the joints are.
+    """A checked trajectory that starts at the present pose.
 
     Between points with velocities it is a cubic Hermite spline, otherwise a straight line.
     """
@@ -26,15 +26,15 @@ class Trajectory:
     def __init__(
         self, joints: Sequence[str], points: Sequence[TrajectoryPoint], present_rad: Mapping[str, float]
     ) -> None:
-        """Check and take it.
+        """Check it.
 
         Args:
             joints: the names, each once.
-            points: with rising times.
-            present_rad: where every driven joint is now; it is the point at time 0 unless there is one.
+            points: with increasing times.
+            present_rad: the present angle of every driven joint: the point at time 0 unless `points` has one.
 
         Raises:
-            MalformedCommandError: lengths that do not fit, times that do not rise, values that are not finite.
+            MalformedCommandError: lists of different lengths, times that do not increase, values that are not finite.
             UnknownJointError: a joint that is not in `present_rad`.
         """
         _check(joints, points, tuple(present_rad))
@@ -62,18 +62,18 @@ class Trajectory:
 def start_delay_s(stamp_ns: int, now_ns: int, max_age_s: float) -> float:
     """Return when a trajectory with this stamp begins, from now [s]; a stamp of 0 means now.
 
-    Raises StaleCommandError where it began more than `max_age_s` ago (0: any stamp will do).
+    Raises StaleCommandError where it began more than `max_age_s` ago (0: any stamp is accepted).
     """
     delay_s = (stamp_ns - now_ns) * 1e-9 if stamp_ns else 0.0
     if max_age_s > 0 and -delay_s > max_age_s:
-        raise StaleCommandError(f"the trajectory began {-delay_s:.3f} s ago: allowed is {max_age_s:g} s")
+        raise StaleCommandError(f"the trajectory must begin at most {max_age_s:g} s ago: it began {-delay_s:.3f} s ago")
     return delay_s
 
 
 def check_end(end_s: float, longest_s: float) -> None:
-    """Raise MalformedCommandError where a trajectory would end more than `longest_s` from now: no time-out sees it."""
+    """Raise MalformedCommandError where a trajectory would end more than `longest_s` from now."""
     if end_s > longest_s:
-        raise MalformedCommandError(f"the trajectory would end in {end_s:.1f} s: allowed is {longest_s:g} s")
+        raise MalformedCommandError(f"the trajectory must end within {longest_s:g} s: it would end in {end_s:.1f} s")
 
 
 def _between(before: TrajectoryPoint, after: TrajectoryPoint, joint: int, time_s: float) -> float:
@@ -93,21 +93,21 @@ def _between(before: TrajectoryPoint, after: TrajectoryPoint, joint: int, time_s
 
 def _check(joints: Sequence[str], points: Sequence[TrajectoryPoint], known: tuple[str, ...]) -> None:
     if not joints or len(set(joints)) != len(joints):
-        raise MalformedCommandError(f"joint_names is {list(joints)!r}: allowed is each driven joint once")
+        raise MalformedCommandError(f"joint_names must name driven joints, each once: got {list(joints)!r}")
     for name in joints:
         if name not in known:
-            raise UnknownJointError(f"joint is {name[:60]!r}: allowed is one of {', '.join(known)}")
+            raise UnknownJointError(f"joint must be one of {', '.join(known)}: got {name[:60]!r}")
     if not points:
-        raise MalformedCommandError("the trajectory has no points: allowed is one or more")
+        raise MalformedCommandError("the trajectory must have one or more points: got none")
     last_s = -math.inf
     for i, point in enumerate(points):
         if not (math.isfinite(point.time_s) and point.time_s >= 0 and point.time_s > last_s):
-            raise MalformedCommandError(f"time_from_start of point {i} is {point.time_s} s: allowed is a rising time")
+            raise MalformedCommandError(f"time_from_start must increase from 0: got {point.time_s} s at point {i}")
         last_s = point.time_s
         for what, values in (("positions", point.positions_rad), ("velocities", point.velocities_rad_s)):
             if values is None:
                 continue
             if len(values) != len(joints):
-                raise MalformedCommandError(f"point {i} has {len(values)} {what}: allowed is {len(joints)}")
+                raise MalformedCommandError(f"point {i} must have {len(joints)} {what}: got {len(values)}")
             if not all(math.isfinite(value) for value in values):
-                raise MalformedCommandError(f"{what} of point {i} are {list(values)}: allowed are finite numbers")
+                raise MalformedCommandError(f"{what} of point {i} must be finite numbers: got {list(values)}")

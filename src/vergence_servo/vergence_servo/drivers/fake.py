@@ -1,4 +1,4 @@
-"""A backend without hardware, whose servos take their time to travel."""
+"""A driver without hardware: it simulates servos that travel at a limited speed."""
 
 import math
 import time
@@ -6,17 +6,23 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from vergence_rig.parameters import Parameters, parameter
-from vergence_servo.drivers.protocol import ChannelError, on_grid
+from vergence_servo.drivers.protocol import Backend, ChannelError, on_grid
+
+_WARNING = "backend 'fake': no servo moves; set 'backend' and 'servos' for a real head"
 
 
 @dataclass(frozen=True)
 class FakeParameters(Parameters):
-    """How the pretended hardware is."""
+    """The simulated hardware."""
 
-    resolution_us: float = parameter(1.0, "smallest change of the pulse", unit="us", minimum=0.001, maximum=100)
-    channels: int = parameter(16, "number of channels", minimum=1, maximum=64)
+    resolution_us: float = parameter(1.0, "smallest change of a simulated pulse", unit="us", minimum=0.001, maximum=100)
+    channels: int = parameter(16, "number of simulated channels", minimum=1, maximum=64)
     speed_us_s: float = parameter(
-        6667.0, "how fast a servo's position follows the pulse (an SG90)", unit="us/s", minimum=1, maximum=1e9
+        6667.0,
+        "speed at which a simulated servo follows its pulse; the default is an SG90's",
+        unit="us/s",
+        minimum=1,
+        maximum=1e9,
     )
 
 
@@ -74,7 +80,7 @@ class FakeDriver:
 
     def _servo(self, channel: int) -> _Servo:
         if channel not in self._servos:
-            raise ChannelError(f"channel is {channel}: allowed is 0 to {len(self._servos) - 1} (backend 'fake')")
+            raise ChannelError(f"backend 'fake': channel must be 0 to {len(self._servos) - 1}: got {channel}")
         return self._servos[channel]
 
     def _travel(self, servo: _Servo) -> None:
@@ -84,3 +90,6 @@ class FakeDriver:
         if servo.pulse_us is not None:
             way_us = servo.pulse_us - servo.position_us
             servo.position_us += math.copysign(min(abs(way_us), reach_us), way_us)
+
+
+BACKEND = Backend("fake", FakeParameters, FakeDriver, moves_servos=False, warning=_WARNING)

@@ -1,7 +1,7 @@
 """Hardware PWM through the kernel's /sys/class/pwm: 2 channels on a Raspberry Pi up to 4, 4 on a Pi 5.
 
-The pulses are made by hardware and do not jitter. They go on when the process dies, however it dies: `servo_node` has
-a guardian process for that.
+The pulses are made by hardware and do not jitter. They go on when the process dies: `servo_node` has a guardian process
+for that.
 """
 
 import errno
@@ -10,25 +10,31 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vergence_rig.parameters import Parameters, parameter
-from vergence_servo.drivers.protocol import ChannelError, DriverIoError, DriverUnavailableError
+from vergence_servo.drivers.protocol import Backend, ChannelError, DriverIoError, DriverUnavailableError
 
 _OVERLAY = "dtoverlay=pwm-2chan,pin=12,func=4,pin2=13,func2=4"
 _BOOT_LINE = f"add '{_OVERLAY}' to /boot/firmware/config.txt and reboot"
 _GROUP = "sudo usermod -aG gpio $USER, then log in anew"
 # The PWM blocks behind the header's pins: BCM2835 to 2837, BCM2711 (Pi 4), RP1 (Pi 5).
 _HEADER_BLOCKS = ("20203000.pwm", "3f20c000.pwm", "7e20c000.pwm", "fe20c000.pwm", "1f00098000.pwm")
-_UDEV_PATIENCE_S = 2.0
+_UDEV_TIMEOUT_S = 2.0
 
 
 @dataclass(frozen=True)
 class KernelPwmParameters(Parameters):
     """Which PWM chip, and its period."""
 
-    root: str = parameter("/sys/class/pwm", "folder of the kernel's PWM chips", read_only=True)
+    root: str = parameter("/sys/class/pwm", "folder in which the kernel shows its PWM chips", read_only=True)
     chip: int = parameter(
-        -1, "number of the pwmchip; -1 finds the one behind the header's pins", minimum=-1, maximum=99, read_only=True
+        -1,
+        "number N of /sys/class/pwm/pwmchipN; -1 finds the chip behind the header's pins",
+        minimum=-1,
+        maximum=99,
+        read_only=True,
     )
-    frequency_hz: float = parameter(50.0, "pulses a second", unit="Hz", minimum=20, maximum=400, read_only=True)
+    frequency_hz: float = parameter(
+        50.0, "pulses per second of the PWM chip", unit="Hz", minimum=20, maximum=400, read_only=True
+    )
 
 
 class KernelPwmDriver:
@@ -44,14 +50,17 @@ class KernelPwmDriver:
         self._count = _read_count(self._chip)
         self._period_ns = round(1e9 / values.frequency_hz)
         self._enabled: set[int] = set()
-        self._met: set[int] = set()
+        self._used: set[int] = set()
 
     def set_pulse_us(self, channel: int, pulse_us: float) -> float:
         """See ServoDriver; the channel is exported and its period set when it is first used."""
         folder = self._folder(channel)
         pulse_ns = round(pulse_us / self.resolution_us) * round(self.resolution_us * 1000)
         if not 0 < pulse_ns < self._period_ns:
-            raise DriverIoError(errno.EINVAL, f"pulse of {pulse_us} us does not fit the period", str(folder))
+            period_us = self._period_ns / 1000
+            raise DriverIoError(
+                errno.EINVAL, f"pulse must be above 0 and below {period_us:g} us: got {pulse_us}", str(folder)
+            )
         try:
             if channel not in self._enabled:
                 self._prepare(channel, folder)
@@ -88,8 +97,8 @@ class KernelPwmDriver:
     def _folder(self, channel: int) -> Path:
         if not 0 <= channel < self._count:
             raise ChannelError(
-                f"channel is {channel}: allowed is 0 to {self._count - 1} ({self._chip}; GPIO 12, 13, 18, 19 are "
-                f"channels 0, 1, 2, 3 on a Pi 5 and 0, 1, 0, 1 before)"
+                f"backend 'kernel_pwm': channel must be 0 to {self._count - 1}: got {channel} ({self._chip}; GPIO 12, "
+                f"13, 18, 19 are channels 0, 1, 2, 3 on a Pi 5 and 0, 1, 0, 1 on earlier ones)"
             )
         return self._chip / f"pwm{channel}"
 
@@ -97,8 +106,8 @@ class KernelPwmDriver:
         if not folder.is_dir():
             _write(self._chip / "export", channel)
         # Waiting holds up all servos: a channel that fails later is tried again by its ServoChannel instead.
-        deadline_s = time.monotonic() + (0.0 if channel in self._met else _UDEV_PATIENCE_S)
-        self._met.add(channel)
+        deadline_s = time.monotonic() + (0.0 if channel in self._used else _UDEV_TIMEOUT_S)
+        self._used.add(channel)
         while True:
             try:
                 self._set_period(folder)
@@ -127,13 +136,17 @@ def _find_chip(root: Path, number: int) -> Path:
         chip = root / f"pwmchip{number}"
         if chip not in chips:
             there = ", ".join(path.name.removeprefix("pwmchip") for path in chips)
-            raise DriverUnavailableError(f"kernel_pwm.chip is {number}: allowed is one of {there} (in {root})")
+            raise DriverUnavailableError(
+                f"parameter 'kernel_pwm.chip' must be one of {there} (in {root}): got {number}"
+            )
         return chip
     of_header = [chip for chip in chips if (chip / "device").resolve().name in _HEADER_BLOCKS]
     if len(of_header or chips) == 1:
         return (of_header or chips)[0]
     names = ", ".join(chip.name for chip in of_header or chips)
-    raise DriverUnavailableError(f"backend 'kernel_pwm': {names} in {root}: choose one with kernel_pwm.chip")
+    raise DriverUnavailableError(
+        f"backend 'kernel_pwm': {root} has {names}: choose one with the parameter kernel_pwm.chip"
+    )
 
 
 def _read_count(chip: Path) -> int:
@@ -156,3 +169,6 @@ def _explained(error: OSError) -> DriverIoError:
     elif error.errno == errno.EBUSY:
         text += " (another program or overlay holds this PWM channel; analogue audio does on a Pi 4)"
     return DriverIoError(error.errno or errno.EIO, text, error.filename)
+
+
+BACKEND = Backend("kernel_pwm", KernelPwmParameters, KernelPwmDriver)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from vergence_rig.parameters import Parameters, parameter
-from vergence_servo.drivers.protocol import ChannelError, DriverIoError, DriverUnavailableError
+from vergence_servo.drivers.protocol import Backend, ChannelError, DriverIoError, DriverUnavailableError
 
-JITTER_WARNING = "backend 'lgpio' times pulses in software: servos jitter under load; kernel_pwm or pca9685 do not"
+_JITTER_WARNING = "backend 'lgpio' times pulses in software: servos jitter under load; kernel_pwm or pca9685 do not"
 _PACKAGE = "sudo apt install python3-lgpio, or pip install lgpio"
 _GROUP = "sudo usermod -aG gpio $USER, then log in anew"
 _LAST_GPIO = 53
@@ -21,9 +21,11 @@ class LgpioParameters(Parameters):
     """Which GPIO chip."""
 
     chip: int = parameter(
-        0, "number of /dev/gpiochip; 4 on a Pi 5 with a kernel before 6.6.45", minimum=0, maximum=99, read_only=True
+        0, "number N of /dev/gpiochipN; 4 on a Pi 5 with a kernel before 6.6.45", minimum=0, maximum=99, read_only=True
     )
-    frequency_hz: int = parameter(50, "pulses a second", unit="Hz", minimum=40, maximum=500, read_only=True)
+    frequency_hz: int = parameter(
+        50, "pulses per second, timed by lgpio", unit="Hz", minimum=40, maximum=500, read_only=True
+    )
 
 
 class LgpioDriver:
@@ -44,7 +46,7 @@ class LgpioDriver:
             self._handle: int | None = lgpio.gpiochip_open(self._values.chip)
         except lgpio.error as error:
             raise DriverUnavailableError(
-                f"backend 'lgpio': {device} cannot be opened ({error}): lgpio.chip must be its number; {_GROUP}"
+                f"backend 'lgpio': {device} cannot be opened ({error}): set lgpio.chip to its number; {_GROUP}"
             ) from error
         self._claimed: set[int] = set()
 
@@ -52,9 +54,9 @@ class LgpioDriver:
         """See ServoDriver; `channel` is a GPIO number."""
         width_us = round(pulse_us)
         if not 0 <= channel <= _LAST_GPIO:
-            raise ChannelError(f"channel is {channel}: allowed is a GPIO number, 0 to {_LAST_GPIO} (backend 'lgpio')")
+            raise ChannelError(f"backend 'lgpio': channel must be a GPIO number, 0 to {_LAST_GPIO}: got {channel}")
         if not 500 <= width_us <= 2500:
-            raise DriverIoError(errno.EINVAL, f"pulse is {pulse_us} us: tx_servo allows 500 to 2500")
+            raise DriverIoError(errno.EINVAL, f"backend 'lgpio': pulse must be 500 to 2500 us: got {pulse_us}")
         try:
             if channel not in self._claimed:
                 self._lgpio.gpio_claim_output(self._handle, channel, 0)
@@ -85,3 +87,6 @@ class LgpioDriver:
         if self._handle is not None:
             self._lgpio.gpiochip_close(self._handle)
             self._handle = None
+
+
+BACKEND = Backend("lgpio", LgpioParameters, LgpioDriver, warning=_JITTER_WARNING)

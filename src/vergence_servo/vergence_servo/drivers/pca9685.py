@@ -10,7 +10,7 @@ from typing import Any
 
 from vergence_rig.parameters import Parameters, parameter
 from vergence_servo.drivers.channels_in_use import ChannelsInUse
-from vergence_servo.drivers.protocol import ChannelError, DriverIoError, DriverUnavailableError
+from vergence_servo.drivers.protocol import Backend, ChannelError, DriverIoError, DriverUnavailableError
 
 _CHANNELS = 16
 _TICKS = 4096
@@ -23,10 +23,17 @@ _GROUP = "sudo usermod -aG i2c $USER, then log in anew"
 class Pca9685Parameters(Parameters):
     """Where the chip is and how fast it runs."""
 
-    address: int = parameter(0x40, "I2C address", minimum=0x40, maximum=0x7F, read_only=True)
-    frequency_hz: float = parameter(50.0, "pulses a second", unit="Hz", minimum=24, maximum=400, read_only=True)
+    address: int = parameter(0x40, "I2C address of the PCA9685", minimum=0x40, maximum=0x7F, read_only=True)
+    frequency_hz: float = parameter(
+        50.0, "pulses per second of the PCA9685", unit="Hz", minimum=24, maximum=400, read_only=True
+    )
     oscillator_hz: float = parameter(
-        25.0e6, "the chip's real clock; 23 to 27 MHz are seen", unit="Hz", minimum=2e7, maximum=3e7, read_only=True
+        25.0e6,
+        "true frequency of the PCA9685's oscillator; specimens have 23 to 27 MHz",
+        unit="Hz",
+        minimum=2e7,
+        maximum=3e7,
+        read_only=True,
     )
 
 
@@ -43,14 +50,16 @@ class Pca9685Driver:
             raise DriverUnavailableError(f"backend 'pca9685': {error}: {_PACKAGE}") from error
         self._chip = _open(PCA9685, _board_bus() if bus is None else bus, values)
         self._channels = ChannelsInUse(self._write)
-        # What the chip really does: its prescaler is a whole number.
+        # The true step: the prescaler is a whole number.
         self.resolution_us = (int(self._chip.prescale_reg) + 1) / values.oscillator_hz * 1e6
 
     def set_pulse_us(self, channel: int, pulse_us: float) -> float:
         """See ServoDriver."""
         ticks = round(pulse_us / self.resolution_us)
         if not 0 < ticks < _TICKS:
-            raise DriverIoError(errno.EINVAL, f"pulse of {pulse_us} us is {ticks} ticks: allowed is 1 to {_TICKS - 1}")
+            raise DriverIoError(
+                errno.EINVAL, f"pulse must be 1 to {_TICKS - 1} ticks: got {pulse_us} us, {ticks} ticks"
+            )
         self._channels.set(channel, ticks)
         return ticks * self.resolution_us
 
@@ -64,7 +73,7 @@ class Pca9685Driver:
 
     def _write(self, channel: int, ticks: int) -> None:
         if not 0 <= channel < _CHANNELS:
-            raise ChannelError(f"channel is {channel}: allowed is 0 to {_CHANNELS - 1} (backend 'pca9685')")
+            raise ChannelError(f"backend 'pca9685': channel must be 0 to {_CHANNELS - 1}: got {channel}")
         try:
             self._chip.channels[channel].duty_cycle = ticks << 4  # the library's scale is 16 bits, the chip's 12
         except (OSError, RuntimeError) as error:
@@ -97,3 +106,6 @@ def _open(library: Any, bus: Any, values: Pca9685Parameters) -> Any:
             f"look with 'i2cdetect -y 1'"
         ) from error
     return chip
+
+
+BACKEND = Backend("pca9685", Pca9685Parameters, Pca9685Driver)

@@ -1,7 +1,7 @@
 """Servo pulses from a pigpio daemon, on this Pi or a remote one (Pi 4 and older: pigpio does not run on a Pi 5).
 
-Spoken to over its socket, 16 bytes each way (pigpio's documentation, "Socket interface"), so that nothing need be
-installed here and a lost daemon cannot block for longer than `timeout_s`. The daemon goes on pulsing when its client
+It uses the daemon's socket, 16 bytes each way (pigpio's documentation, "Socket interface"): nothing need be installed
+here, and a lost daemon blocks for no longer than `timeout_s`. The daemon goes on pulsing when its client
 dies.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from vergence_rig.parameters import Parameters, parameter
 from vergence_servo.drivers.channels_in_use import ChannelsInUse
-from vergence_servo.drivers.protocol import ChannelError, DriverIoError, DriverUnavailableError
+from vergence_servo.drivers.protocol import Backend, ChannelError, DriverIoError, DriverUnavailableError
 
 _SERVO, _REAL_RANGE, _FREQUENCY, _VERSION = 8, 24, 23, 26
 _LAST_GPIO = 31
@@ -29,9 +29,13 @@ _START = "start it on the Pi: sudo apt install pigpio && sudo systemctl enable -
 class PigpioParameters(Parameters):
     """Where the daemon is."""
 
-    host: str = parameter("localhost", "the daemon's host; a remote one needs 'pigpiod' without -l", read_only=True)
-    port: int = parameter(8888, "the daemon's port", minimum=1, maximum=65535, read_only=True)
-    timeout_s: float = parameter(0.25, "longest wait for an answer", unit="s", minimum=0.01, maximum=10, read_only=True)
+    host: str = parameter(
+        "localhost", "host of the pigpio daemon; a remote one needs 'pigpiod' without -l", read_only=True
+    )
+    port: int = parameter(8888, "port of the pigpio daemon", minimum=1, maximum=65535, read_only=True)
+    timeout_s: float = parameter(
+        0.25, "longest wait for the pigpio daemon's answer", unit="s", minimum=0.01, maximum=10, read_only=True
+    )
 
 
 class PigpioDriver:
@@ -49,14 +53,14 @@ class PigpioDriver:
         except OSError as error:
             place = f"{self._values.host}:{self._values.port}"
             raise DriverUnavailableError(f"backend 'pigpio': no daemon at {place} ({error}): {_START}") from error
-        # The daemon's sample time (pigpiod -s, 5 us by default) is the step of every pulse; any GPIO's PWM tells it.
+        # The daemon's sample time (pigpiod -s, 5 us by default) is the step of all pulses.
         self.resolution_us = round(1e6 / (frequency_hz * real_range)) if frequency_hz > 0 and real_range > 0 else 5.0
 
     def set_pulse_us(self, channel: int, pulse_us: float) -> float:
         """See ServoDriver; `channel` is a GPIO number."""
         width_us = round(round(pulse_us / self.resolution_us) * self.resolution_us)
         if width_us <= 0:
-            raise DriverIoError(errno.EINVAL, f"pulse is {pulse_us} us: allowed is more than 0")
+            raise DriverIoError(errno.EINVAL, f"backend 'pigpio': pulse must be more than 0 us: got {pulse_us}")
         self._channels.set(channel, width_us)
         return float(width_us)
 
@@ -102,5 +106,8 @@ class PigpioDriver:
 
 def _checked(gpio: int) -> int:
     if not 0 <= gpio <= _LAST_GPIO:
-        raise ChannelError(f"channel is {gpio}: allowed is a GPIO number, 0 to {_LAST_GPIO} (backend 'pigpio')")
+        raise ChannelError(f"backend 'pigpio': channel must be a GPIO number, 0 to {_LAST_GPIO}: got {gpio}")
     return gpio
+
+
+BACKEND = Backend("pigpio", PigpioParameters, PigpioDriver)

@@ -1,10 +1,14 @@
-"""What every servo backend does, and the ways in which one can fail."""
+"""The interface of a servo driver, its entry in the registry, and its errors."""
 
-from typing import Protocol
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from vergence_rig.parameters import Parameters
 
 
 class DriverUnavailableError(ValueError):
-    """A backend that cannot be opened here. Its text names the package, group or device-tree line that mends it."""
+    """A backend that cannot be opened here. The message names the package, group or boot line that is missing."""
 
 
 class ChannelError(ValueError):
@@ -35,7 +39,7 @@ class ServoDriver(Protocol):
 
         Raises:
             ChannelError: no such channel.
-            DriverIoError: the hardware did not take it.
+            DriverIoError: the write failed.
         """
 
     def release(self, channel: int) -> None:
@@ -43,6 +47,25 @@ class ServoDriver(Protocol):
 
     def close(self) -> None:
         """Release every channel that was used and free the hardware. Closing twice does nothing; raises nothing."""
+
+
+@dataclass(frozen=True)
+class Backend:
+    """A servo driver under the name that the parameter `backend` chooses it by.
+
+    Attributes:
+        name: also the prefix of its parameters, such as `pca9685.address`.
+        parameters: the class of its parameters.
+        open: makes the driver from an instance of them; may raise DriverUnavailableError.
+        moves_servos: False for one without hardware, which the built-in servos.yaml is good enough for.
+        warning: logged at the start; empty for none.
+    """
+
+    name: str
+    parameters: type[Parameters]
+    open: Callable[[Any], ServoDriver]
+    moves_servos: bool = True
+    warning: str = ""
 
 
 def on_grid(pulse_us: float, resolution_us: float) -> float:

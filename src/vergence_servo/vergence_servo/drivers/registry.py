@@ -1,24 +1,10 @@
-"""Backends by name."""
+"""Servo drivers by name. `register_backend` adds one; the parameter `backend` of servo_node chooses one."""
 
 from collections.abc import Mapping
 from typing import Any
 
-from vergence_rig.parameters import Parameters
-from vergence_servo.drivers.fake import FakeDriver, FakeParameters
-from vergence_servo.drivers.kernel_pwm import KernelPwmDriver, KernelPwmParameters
-from vergence_servo.drivers.lgpio import LgpioDriver, LgpioParameters
-from vergence_servo.drivers.pca9685 import Pca9685Driver, Pca9685Parameters
-from vergence_servo.drivers.pigpio import PigpioDriver, PigpioParameters
-from vergence_servo.drivers.protocol import DriverUnavailableError, ServoDriver
-
-BACKENDS: dict[str, tuple[type[Parameters], Any]] = {
-    "fake": (FakeParameters, FakeDriver),
-    "kernel_pwm": (KernelPwmParameters, KernelPwmDriver),
-    "pca9685": (Pca9685Parameters, Pca9685Driver),
-    "pigpio": (PigpioParameters, PigpioDriver),
-    "lgpio": (LgpioParameters, LgpioDriver),
-}
-"""Name to the parameters' and the driver's class."""
+from vergence_servo.drivers import fake, kernel_pwm, lgpio, pca9685, pigpio
+from vergence_servo.drivers.protocol import Backend, DriverUnavailableError, ServoDriver
 
 REFUSED = {
     "gpiozero": (
@@ -26,20 +12,42 @@ REFUSED = {
         "(gpiozero issue 1209). Use kernel_pwm, pca9685 or, failing these, lgpio"
     ),
 }
-"""Backends that one may ask for and does not get, with the reason."""
+"""Names that users may expect but that are refused, each with the reason."""
+
+_BACKENDS: dict[str, Backend] = {}
 
 
-def check_name(name: str) -> None:
-    """Raise DriverUnavailableError if there is no such backend, with the reason where it is refused."""
+def register_backend(backend: Backend) -> None:
+    """Add a driver under a name that is free; raises ValueError for one in use."""
+    if backend.name in _BACKENDS or backend.name in REFUSED:
+        raise ValueError(f"the name of a servo driver must be new: got {backend.name!r}, which is registered")
+    _BACKENDS[backend.name] = backend
+
+
+def backend_names() -> tuple[str, ...]:
+    """Return the names of all registered drivers, in order of registration."""
+    return tuple(_BACKENDS)
+
+
+def backends() -> tuple[Backend, ...]:
+    """Return all registered drivers, in order of registration."""
+    return tuple(_BACKENDS.values())
+
+
+def find_backend(name: str) -> Backend:
+    """Return the driver registered under a name. Raises DriverUnavailableError, with the reason for a refused name."""
     if name in REFUSED:
-        raise DriverUnavailableError(f"parameter 'backend' is {name!r}: refused, because {REFUSED[name]}")
-    if name not in BACKENDS:
-        raise DriverUnavailableError(f"parameter 'backend' is {name!r}: allowed is one of {', '.join(BACKENDS)}")
+        raise DriverUnavailableError(f"parameter 'backend' must not be {name!r}: {REFUSED[name]}")
+    if name not in _BACKENDS:
+        raise DriverUnavailableError(f"parameter 'backend' must be one of {', '.join(_BACKENDS)}: got {name!r}")
+    return _BACKENDS[name]
 
 
 def open_driver(name: str, values: Mapping[str, Any] | None = None) -> ServoDriver:
-    """Open a backend with its parameters by name. Raises DriverUnavailableError or ParameterError."""
-    check_name(name)
-    parameters, driver = BACKENDS[name]
-    opened: ServoDriver = driver(parameters.from_mapping(values or {}))
-    return opened
+    """Open a driver with its parameters by name. Raises DriverUnavailableError or ParameterError."""
+    entry = find_backend(name)
+    return entry.open(entry.parameters.from_mapping(values or {}))
+
+
+for _module in (fake, kernel_pwm, pca9685, pigpio, lgpio):
+    register_backend(_module.BACKEND)

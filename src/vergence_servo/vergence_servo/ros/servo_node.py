@@ -1,4 +1,4 @@
-"""servo_node: commands on topics to pulses on wires, safely."""
+"""servo_node: turns joint commands on topics into servo pulses within all limits."""
 
 import dataclasses
 import time
@@ -29,26 +29,25 @@ from vergence_servo.command_guard import (
     ordered_positions,
 )
 from vergence_servo.commanders import conflict
-from vergence_servo.drivers.lgpio import JITTER_WARNING
-from vergence_servo.drivers.registry import BACKENDS, open_driver
+from vergence_servo.drivers.registry import find_backend, open_driver
 from vergence_servo.guardian import Guardian
 from vergence_servo.last_pose import default_pose_file, read_pose, write_pose
+from vergence_servo.parameters import ServoNodeParameters, parameter_groups
 from vergence_servo.ros import servo_messages as convert
-from vergence_servo.servo_channel import ServoChannel
+from vergence_servo.servo_channel import RetryParameters, ServoChannel
 from vergence_servo.servo_head import Mode, ServoHead
-from vergence_servo.servo_health import CommandCounts, Health, channel_health, commands_health, head_health
-from vergence_servo.servo_parameters import GROUPS, ServoNodeParameters
+from vergence_servo.servo_reports import CommandCounts, channel_report, commands_report, head_report
 from vergence_servo.trajectory import Trajectory, check_end, start_delay_s
 
 COMMAND_TOPICS = ("joint_command", "~/commands", "joint_trajectory")
 
 
 class ServoNode(Node):
-    """The rim of ServoHead."""
+    """Connects ServoHead to topics, services, timers and diagnostics."""
 
     def __init__(self, **node_options: Any) -> None:
         super().__init__("servo_node", **node_options)
-        self._settings = declare(self, GROUPS)
+        self._settings = declare(self, parameter_groups())
         values: ServoNodeParameters = self._settings.value
         servos = load_servos(values.servos)
         rig = load_rig(values.rig)
@@ -59,7 +58,7 @@ class ServoNode(Node):
             name: servo_limits(name, servos[name], rig.joints[name] if name in JOINT_NAMES else None)
             for name in values.joints
         }
-        backend_values = dataclasses.asdict(self._settings.get(BACKENDS[values.backend][0]))
+        backend_values = dataclasses.asdict(self._settings.get(find_backend(values.backend).parameters))
         self._driver = open_driver(values.backend, backend_values)
         self._guardian: Guardian | None = None
         try:
@@ -68,7 +67,9 @@ class ServoNode(Node):
                 self._guardian = Guardian(values.backend, backend_values, channels)
             self._pose_file = Path(values.pose_file) if values.pose_file else default_pose_file()
             self._pose = read_pose(self._pose_file)
-            self._head = ServoHead(self._driver, limits, values, self._pose, time.monotonic())
+            self._head = ServoHead(
+                self._driver, limits, values, self._pose, time.monotonic(), self._settings.get(RetryParameters)
+            )
         except BaseException:
             self._driver.close()
             if self._guardian is not None:
@@ -83,25 +84,21 @@ class ServoNode(Node):
         self._connect(values)
 
     def _begin(self, values: ServoNodeParameters) -> None:
-        if values.backend == "lgpio":
-            self.get_logger().warning(JITTER_WARNING)
-        if values.backend == "fake":
-            self.get_logger().warning("backend 'fake': no servo moves; set 'backend' and 'servos' for a real head")
+        if find_backend(values.backend).warning:
+            self.get_logger().warning(find_backend(values.backend).warning)
         if not values.enabled:
             self._head.enable(False, time.monotonic())
         elif values.start == "last_pose" and self._pose:
             self._head.attach_all(time.monotonic())
         elif values.start == "last_pose":
-            self.get_logger().warning(f"no last pose in {self._pose_file}: starting released")
+            self.get_logger().warning(f"no last pose in {self._pose_file}: the servos start released")
 
     def _connect(self, values: ServoNodeParameters) -> None:
         diagnostics = Diagnostics(self, values.backend)
-        diagnostics.add(
-            "servos", lambda: _report(head_health(self._head, values.backend, self._driver, self._guardian))
-        )
-        diagnostics.add("commands", lambda: _report(commands_health(self._counts, self._conflict, time.monotonic())))
+        diagnostics.add("servos", lambda: head_report(self._head, values.backend, self._driver, self._guardian))
+        diagnostics.add("commands", lambda: commands_report(self._counts, self._conflict, time.monotonic()))
         for channel in self._head.channels.values():
-            diagnostics.add(channel.name, partial(_channel_report, channel))
+            diagnostics.add(channel.name, partial(self._report_channel, channel))
         watch = watch_qos(self, diagnostics)
         self._states = watch.create_publisher(JointState, "joint_states")
         latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
@@ -121,24 +118,28 @@ class ServoNode(Node):
         )
         self.create_timer(1.0 / values.update_rate_hz, lambda: self._head.step(time.monotonic()))
         self.create_timer(1.0 / values.state_rate_hz, self._publish_state)
-        self.create_timer(1.0, self._look_around)
+        self.create_timer(1.0, self._check_commanders)
+
+    @staticmethod
+    def _report_channel(channel: ServoChannel) -> Report:
+        return channel_report(channel, time.monotonic())
 
     def _on_command(self, message: JointState) -> None:
-        def take(now_s: float) -> None:
+        def apply(now_s: float) -> None:
             positions = named_positions(message.name, message.position, tuple(self._head.channels))
             self._check_stamp(message)
             self._head.command(positions, now_s)
 
-        self._take("joint_command", take)
+        self._execute("joint_command", apply)
 
     def _on_commands(self, message: Float64MultiArray) -> None:
-        def take(now_s: float) -> None:
+        def apply(now_s: float) -> None:
             self._head.command(ordered_positions(message.data, tuple(self._head.channels)), now_s)
 
-        self._take("~/commands", take)
+        self._execute("~/commands", apply)
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
-        def take(now_s: float) -> None:
+        def apply(now_s: float) -> None:
             points = convert.trajectory_points(message)
             trajectory = Trajectory(message.joint_names, points, self._head.sent_rad())
             stamp_ns, now_ns = to_nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
@@ -147,17 +148,17 @@ class ServoNode(Node):
             check_end(delay_s + trajectory.duration_s, values.trajectory_max_s)
             self._head.follow(trajectory, now_s + delay_s, now_s)
 
-        self._take("joint_trajectory", take)
+        self._execute("joint_trajectory", apply)
 
-    def _take(self, topic: str, take: Callable[[float], None]) -> None:
+    def _execute(self, topic: str, apply: Callable[[float], None]) -> None:
         now_s = time.monotonic()
         try:
-            take(now_s)
+            apply(now_s)
         except CommandRefusedError as error:
-            self._counts.refused(topic, str(error), now_s)
+            self._counts.refuse(topic, str(error), now_s)
             self.get_logger().warning(f"{topic} refused: {error}", throttle_duration_sec=1.0)
             return
-        self._counts.accepted(topic, now_s)
+        self._counts.accept(topic, now_s)
         self._head.step(now_s)
 
     def _check_stamp(self, message: JointState) -> None:
@@ -185,26 +186,26 @@ class ServoNode(Node):
         self._reported_rad = (now_s, positions)
         self._states.publish(convert.joint_state(self.get_clock().now().to_msg(), positions, velocities))
 
-    def _look_around(self) -> None:
+    def _check_commanders(self) -> None:
         found = conflict(convert.commanders(self, COMMAND_TOPICS))
         if found and found != self._conflict:
             self.get_logger().error(found)
         self._conflict = found
         if self._head.mode is not Mode.COMMANDED:
-            self._remember_pose()
+            self._save_pose()
 
-    def _remember_pose(self) -> None:
+    def _save_pose(self) -> None:
         pose = self._head.sent_rad()
         if pose == self._pose:
             return
         try:
             write_pose(self._pose_file, pose)
         except OSError as error:
-            self.get_logger().warning(f"the last pose cannot be kept: {error}", throttle_duration_sec=60.0)
+            self.get_logger().warning(f"the last pose cannot be saved: {error}", throttle_duration_sec=60.0)
         self._pose = pose
 
     def _changed(self, settings: ParameterSet) -> None:
-        self._head.set_parameters(settings.value)
+        self._head.set_parameters(settings.value, settings.get(RetryParameters))
         self._stamps = self._new_stamp_guard(settings.value)
 
     @staticmethod
@@ -220,19 +221,11 @@ class ServoNode(Node):
             while not self._head.parked and time.monotonic() < deadline_s:
                 self._head.step(time.monotonic())
                 time.sleep(0.005)
-        self._remember_pose()
+        self._save_pose()
         self._head.release(time.monotonic())
         self._driver.close()
         if self._guardian is not None:
             self._guardian.dismiss()
-
-
-def _channel_report(channel: ServoChannel) -> Report:
-    return _report(channel_health(channel, time.monotonic()))
-
-
-def _report(health: Health) -> Report:
-    return Report(health.level, health.message, health.values)
 
 
 def main(args: list[str] | None = None) -> int:
