@@ -4,10 +4,11 @@
 # make bench  every benchmark (ONLY=name for one), results in out/bench
 # make study  docs/metric_study.md anew, from the simulator
 # make setup  only the environment and the build
-# All of them make .venv and install/ first, or find them ready.
+# All of these make .venv and install/ first, or find them ready, with the versions of requirements/lock.txt.
+# make lock   the newest versions into requirements/lock.txt (ARGS=--keep: only what the requirements make necessary)
 SHELL := /bin/bash
 .DEFAULT_GOAL := demo
-.PHONY: setup setup-dev demo test lint bench study clean
+.PHONY: setup setup-dev demo test lint bench study lock clean
 
 setup:
 	@bash tools/bootstrap.sh run
@@ -29,6 +30,9 @@ bench: setup-dev
 
 study: setup-dev
 	@source env.sh && exec python tools/metric_study.py
+
+lock:
+	@bash tools/lock.sh $(ARGS)
 
 clean:
 	rm -rf .venv build install log out

@@ -8,6 +8,8 @@ level="${1:-run}"
 venv="$root/.venv"
 ros_setup="${VERGENCE_ROS_SETUP:-/opt/ros/jazzy/setup.bash}"
 python="${PYTHON:-python3}"
+# Exact versions, written by tools/lock.sh. Beside an apt ROS those that fit apt's numpy and OpenCV.
+if [ -f "$ros_setup" ]; then lock=requirements/lock_apt.txt; else lock=requirements/lock.txt; fi
 
 say() { printf '\033[1m[setup]\033[0m %s\n' "$*" >&2; }
 fail() { printf '[setup] %s\n' "$*" >&2; exit 1; }
@@ -32,14 +34,16 @@ need_tools() {
 install_packages() {  # install_packages STAMP REQUIREMENTS...
   local name="$1" stamp="$venv/.stamp-$1" sum
   shift
-  sum="$(cat "$@" | sha256sum)"
+  sum="$(cat "$@" "$lock" | sha256sum)"
   [ "$(cat "$stamp" 2>/dev/null)" = "$sum" ] && return 0
   say "installing packages ($name): $*"
   local args=() file
   for file in "$@"; do args+=(-r "$file"); done
   local progress=on
   [ -t 2 ] || progress=off
-  "$venv/bin/pip" install --disable-pip-version-check --progress-bar "$progress" "${args[@]}" 2>&1 |
+  # By the environment, so that what pip builds from source is built with locked versions as well.
+  PIP_CONSTRAINT="$lock" PIP_BUILD_CONSTRAINT="$lock" \
+    "$venv/bin/pip" install --disable-pip-version-check --progress-bar "$progress" "${args[@]}" 2>&1 |
     grep --line-buffered -E '^(Collecting|Installing collected|Successfully|ERROR|error)|[Ee]rror:' |
     sed -u -E 's/^Collecting ([^ (]+).*/[setup]   fetching \1/; s/^(Installing collected packages).*/[setup]   installing/; s/^Successfully installed.*/[setup]   done/' >&2 ||
     true
@@ -58,9 +62,11 @@ make_venv() {
     fi
   fi
   if [ -f "$ros_setup" ]; then
-    install_packages run requirements/run.txt
+    "$venv/bin/python" -c 'import cv2, numpy, yaml' 2>/dev/null ||
+      fail "ROS is here, but not what its packages need: apt install python3-numpy python3-opencv python3-yaml"
+    install_packages run requirements/beside_apt.txt
   else
-    install_packages ros requirements/ros.txt requirements/run.txt
+    install_packages ros requirements/ros.txt requirements/run.txt requirements/beside_apt.txt
     "$venv/bin/python" tools/mend_wheel_paths.py "$venv"
   fi
   [ "$level" = dev ] && install_packages dev requirements/dev.txt
