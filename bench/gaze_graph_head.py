@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from bench.gaze_runs import Scenario, Trace, travel_s
 from bench.results import OUT_DIR
 from vergence_bringup.demo.ros.recorder import Recorder, Stamped
-from vergence_bringup.demo.ros.stage import Stage, of_class
+from vergence_bringup.demo.ros.stage import Stage, class_goal
 from vergence_bringup.ros.processes import ProcessGroup, config_dir
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
@@ -33,18 +33,18 @@ class ProcessHead:
     """One head at a time; `open_head` makes it. Times of traces count from when the goal was sent."""
 
     def __init__(self, recorder: Recorder, nodes: ProcessGroup, rig: Rig) -> None:
-        self._recorder, self._alive, self._rig = recorder, nodes.check, rig
+        self._recorder, self._check_alive, self._rig = recorder, nodes.check, rig
         self._stage = Stage(recorder, nodes.check, ("target", "occluder"))
-        self._joints = recorder.listen(JointState, "ground_truth/joint_states", nodes.check)
+        self._joints = recorder.record(JointState, "ground_truth/joint_states", nodes.check)
         self._stage.wait_until_ready()
         recorder.wait_for("ground_truth/joint_states", lambda: self._joints, 40.0, nodes.check)
 
     def at_rest(self, scenario: Scenario) -> Trace:
         """Run a scenario whose target rests, from its start pose; it is given as the scenario says."""
         self._prepare(scenario)
-        goal = of_class(TARGET, _LIMIT_S) if scenario.given == "class" else self._two_clicks()
+        goal = class_goal(TARGET, _LIMIT_S) if scenario.given == "class" else self._two_clicks()
         began_s, mark = self._recorder.now_s(), len(self._recorder.boxes)
-        self._recorder.look_at(goal, self._alive)
+        self._recorder.look_at(goal, self._check_alive)
         self._run_until(began_s + scenario.duration_s)
         first_result_s = 0.0
         if scenario.given == "class":
@@ -58,7 +58,7 @@ class ProcessHead:
         """Run a scenario with the occluder before the target, at 0.6 of its distance, for a while."""
         self._prepare(scenario)
         began_s = self._recorder.now_s()
-        self._recorder.look_at(of_class(TARGET, _LIMIT_S), self._alive)
+        self._recorder.look_at(class_goal(TARGET, _LIMIT_S), self._check_alive)
         self._run_until(began_s + from_s)
         self._stage.put("occluder", 0.6 * np.asarray(scenario.target(0.0)))
         self._run_until(began_s + until_s)
@@ -69,16 +69,16 @@ class ProcessHead:
     def pursuing(self, scenario: Scenario, velocity_m_s: Point, moves_from_s: float) -> Trace:
         """Run a scenario whose target moves at a constant velocity from `moves_from_s` to the end."""
         self._prepare(scenario)
-        self._recorder.look_at(of_class(TARGET, _LIMIT_S), self._alive)
+        self._recorder.look_at(class_goal(TARGET, _LIMIT_S), self._check_alive)
         self._stage.settle()
         x, y, z = (float(value) for value in velocity_m_s)
         ramp = {"motion.kind": "ramp", "motion.x_m": x, "motion.y_m": y, "motion.z_m": z}
         began_s = self._recorder.now_s() - moves_from_s
-        self._recorder.set_parameters("sim_node", ramp, self._alive)
+        self._recorder.set_parameters("sim_node", ramp, self._check_alive)
         self._run_until(began_s + scenario.duration_s)
         trace = self._trace(began_s, scenario.duration_s, math.nan)
         self._stage.hide("target")
-        self._recorder.set_parameters("sim_node", {"motion.kind": "static"}, self._alive)
+        self._recorder.set_parameters("sim_node", {"motion.kind": "static"}, self._check_alive)
         return trace
 
     def latency_s(self) -> float:
@@ -98,7 +98,7 @@ class ProcessHead:
             "the truth of the target in its place",
             lambda: to_seconds(recorder.truths[-1].message.header.stamp) > shown_s + 0.02,
             5.0,
-            self._alive,
+            self._check_alive,
         )
 
     def _two_clicks(self) -> LookAt.Goal:
@@ -111,7 +111,7 @@ class ProcessHead:
         return goal
 
     def _run_until(self, time_s: float) -> None:
-        self._recorder.settle(time_s - self._recorder.now_s(), self._alive)
+        self._recorder.settle(time_s - self._recorder.now_s(), self._check_alive)
 
     def _trace(self, began_s: float, duration_s: float, first_result_s: float) -> Trace:
         """Return what happened, sampled where the controller spoke."""

@@ -12,7 +12,7 @@ pytestmark = [pytest.mark.system, pytest.mark.usefixtures("opengl")]
 
 @pytest.mark.timeout(240)
 def test_a_click_and_a_class_end_on_the_target_and_leave_their_report(domain_id: int, tmp_path: Path) -> None:
-    stations = ["cube_right_up", "cube_told_apart"]
+    stations = ["cube_right_up", "cube_distractor"]
     command = [sys.executable, "-m", "vergence_bringup.command_line", "demo", "--out", str(tmp_path)]
     for name in stations:
         command += ["--station", name]

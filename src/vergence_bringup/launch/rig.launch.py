@@ -24,11 +24,11 @@ def generate_launch_description() -> LaunchDescription:
     rig = LaunchConfiguration("rig")
 
     def text(value: Any) -> ParameterValue:
-        # Else launch takes 0 for a number and off for false.
+        # Otherwise launch reads 0 as a number and off as false.
         return ParameterValue(value, value_type=str)
 
     def settings(executable: str) -> list[Any]:
-        # the second file is what vergence identify found; without one the first again, which changes nothing
+        # The second file is the result of vergence identify; without one it is the first again.
         shipped = str(config / f"{executable}.yaml")
         return [shipped, PythonExpression(["'", LaunchConfiguration("identified"), f"' or '{shipped}'"])]
 
@@ -69,25 +69,41 @@ def generate_launch_description() -> LaunchDescription:
 
     return LaunchDescription(
         [
-            DeclareLaunchArgument("left_device", description="the left camera: by-id path, serial, /dev/videoN or URL"),
-            DeclareLaunchArgument("right_device", description="the right camera"),
-            DeclareLaunchArgument("left_camera_info_url", default_value="", description="file:// or package:// YAML"),
-            DeclareLaunchArgument("right_camera_info_url", default_value=""),
-            DeclareLaunchArgument("namespace", default_value="", description="namespace of the whole head"),
-            DeclareLaunchArgument("rig", default_value=str(config / "rig.yaml"), description="the rig's description"),
-            DeclareLaunchArgument("identified", default_value="", description="rig.nodes.yaml of vergence identify"),
+            DeclareLaunchArgument("left_device", description="left camera: by-id path, serial, /dev/videoN or URL"),
+            DeclareLaunchArgument("right_device", description="right camera: by-id path, serial, /dev/videoN or URL"),
+            DeclareLaunchArgument(
+                "left_camera_info_url",
+                default_value="",
+                description="calibration of the left camera: file:// or package:// YAML",
+            ),
+            DeclareLaunchArgument(
+                "right_camera_info_url",
+                default_value="",
+                description="calibration of the right camera: file:// or package:// YAML",
+            ),
+            DeclareLaunchArgument("namespace", default_value="", description="namespace of all nodes of the head"),
+            DeclareLaunchArgument("rig", default_value=str(config / "rig.yaml"), description="path of rig.yaml"),
+            DeclareLaunchArgument(
+                "identified", default_value="", description="path of rig.nodes.yaml, written by vergence identify"
+            ),
             DeclareLaunchArgument("servos", default_value="true", description="run servo_node on this machine"),
             DeclareLaunchArgument("detector", default_value="false", description="run box_metric_node"),
             DeclareLaunchArgument(
-                "model", default_value="", description="its ONNX file; empty is the one of the simulator's cube"
+                "model",
+                default_value="",
+                description="ONNX file of the detector; empty for the one of the simulator's cube",
             ),
             DeclareLaunchArgument(
-                "lock", default_value="true", description="one fixed exposure and white balance for both cameras"
+                "lock", default_value="true", description="hold one exposure and white balance for both cameras"
             ),
             DeclareLaunchArgument(
-                "encoder", default_value="true", description="run eye_rotation_node, the visual encoder"
+                "encoder",
+                default_value="true",
+                description="run eye_rotation_node, the visual encoder of the eyes' angles",
             ),
-            DeclareLaunchArgument("fastdds_profile", default_value=str(config / "fastdds.xml")),
+            DeclareLaunchArgument(
+                "fastdds_profile", default_value=str(config / "fastdds.xml"), description="Fast DDS profile"
+            ),
             SetEnvironmentVariable("FASTRTPS_DEFAULT_PROFILES_FILE", LaunchConfiguration("fastdds_profile")),
             GroupAction(
                 [

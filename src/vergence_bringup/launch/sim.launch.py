@@ -30,18 +30,26 @@ def generate_launch_description() -> LaunchDescription:
 
     return LaunchDescription(
         [
-            DeclareLaunchArgument("namespace", default_value="", description="namespace of the whole head"),
-            DeclareLaunchArgument("rig", default_value=str(config / "rig.yaml"), description="the rig's description"),
+            DeclareLaunchArgument("namespace", default_value="", description="namespace of all nodes of the head"),
+            DeclareLaunchArgument("rig", default_value=str(config / "rig.yaml"), description="path of rig.yaml"),
             DeclareLaunchArgument(
-                "preset", default_value="realistic", description="realistic or ideal cameras and servos"
+                "preset",
+                default_value="realistic",
+                description="imperfections of cameras and servos: realistic or ideal",
             ),
             DeclareLaunchArgument(
-                "detector", default_value="true", description="run box_metric_node, which knows the simulator's cube"
+                "detector",
+                default_value="true",
+                description="run box_metric_node, whose detector finds the simulator's cube",
             ),
             DeclareLaunchArgument(
-                "encoder", default_value="true", description="run eye_rotation_node, the visual encoder"
+                "encoder",
+                default_value="true",
+                description="run eye_rotation_node, the visual encoder of the eyes' angles",
             ),
-            DeclareLaunchArgument("fastdds_profile", default_value=str(config / "fastdds.xml")),
+            DeclareLaunchArgument(
+                "fastdds_profile", default_value=str(config / "fastdds.xml"), description="Fast DDS profile"
+            ),
             SetEnvironmentVariable("FASTRTPS_DEFAULT_PROFILES_FILE", LaunchConfiguration("fastdds_profile")),
             GroupAction(
                 [

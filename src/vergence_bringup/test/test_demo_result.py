@@ -58,7 +58,7 @@ def boxes():
     ("changes", "passed"),
     [
         ({}, True),
-        ({"said_verged": False}, False),
+        ({"reported_verged": False}, False),
         ({"true_error_deg": 0.76}, False),
         ({"true_error_deg": math.nan}, False),
         ({"off_axis_deg": 2.7}, False),
@@ -87,7 +87,7 @@ def test_summary_is_strict_json_with_null_for_what_is_not_known(result, tmp_path
 
 
 def test_table_has_every_window_and_both_directions(result):
-    text = table([result, dataclasses.replace(result, said_verged=False, reason="lost")])
+    text = table([result, dataclasses.replace(result, reported_verged=False, reason="lost")])
     assert "NOT VERGED" in text
     assert "lost" in text
     assert text.count("L to R") == 4
@@ -115,16 +115,16 @@ def test_metric_ii_stands_beside_metric_i(result, boxes):
 
 def test_a_station_that_came_to_nothing_has_its_reason_everywhere(tmp_path):
     station = stations(0.065)[0]
-    result = unfinished(station, "waited 5 s in vain for <images>")
+    result = unfinished(station, "timeout after 5 s waiting for <images>")
     assert not result.passed
-    assert "in vain" in table([result])
+    assert "waiting" in table([result])
     write_summary(tmp_path / "summary.json", [result], SETTINGS)
     stored = json.loads((tmp_path / "summary.json").read_text(), parse_constant=pytest.fail)
     assert stored["passed"] is False
     assert stored["stations"][0]["reason"] == result.reason
     assert stored["stations"][0]["left_to_right_px"] == {"start": [], "end": []}
     write_report(tmp_path / "report.html", [result], SETTINGS, tmp_path)
-    assert "in vain for &lt;images&gt;" in (tmp_path / "report.html").read_text()
+    assert "waiting for &lt;images&gt;" in (tmp_path / "report.html").read_text()
 
 
 def test_report_carries_its_pictures_and_plots(result, boxes, tmp_path):
@@ -156,7 +156,7 @@ def test_stations_are_what_the_paper_and_the_promise_say():
     assert {station.name for station in stations(0.065, short=True)} < {station.name for station in every}
 
 
-def test_the_detector_has_something_nearer_to_tell_apart():
+def test_the_distractor_is_nearer_than_the_target():
     (station,) = (station for station in stations(0.065) if station.by_class)
     assert station.has_boxes
     assert station.distractor_m is not None

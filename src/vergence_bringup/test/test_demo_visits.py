@@ -34,7 +34,7 @@ class ScriptedRunner:
             raise self.failures[station.name]
         return dataclasses.replace(
             unfinished(station, ""),
-            said_verged=True,
+            reported_verged=True,
             true_error_deg=0.1,
             off_axis_deg=0.1,
             tolerance_deg=0.75,
@@ -55,11 +55,11 @@ def test_every_station_is_visited_in_order():
     runner, results, said = outcome({})
     assert runner.visited == [station.name for station in THREE]
     assert all(result.passed for result in results)
-    assert said.count("graph: verged") == 3
+    assert said.count("reported verged") == 3
 
 
 def test_a_node_that_does_not_answer_fails_its_station_and_the_next_is_tried():
-    silent = GraphError("waited 5 s in vain for sim_node to take parameters")
+    silent = GraphError("timeout after 5 s waiting for sim_node to set parameters")
     runner, results, said = outcome({THREE[1].name: silent})
     assert [result.passed for result in results] == [True, False, True]
     assert results[1].reason == str(silent)

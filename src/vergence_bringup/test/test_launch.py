@@ -1,10 +1,10 @@
-"""The launch files: which nodes run for which arguments, and what the two cameras are told."""
+"""The launch files: which nodes run for which arguments, and which parameters the two cameras get."""
 
 from pathlib import Path
 
 import pytest
 
-from vergence_bringup.node_table import NODES
+from vergence_bringup.node_table import NODES, SIMULATED, graph
 
 pytest.importorskip("launch_ros", reason="launch is not installed here (it comes with ROS from apt)")
 
@@ -34,12 +34,16 @@ def nodes(file, **arguments):
 
 
 def parameters(node, context):
-    """Return what a node is told beyond its YAML file. Launch has no public way to ask."""
+    """Return a node's parameters beyond its YAML file. Launch has no public way to read them."""
     values = {}
     for part in evaluate_parameters(context, node._Node__parameters):
         if isinstance(part, dict):
             values.update(part)
     return values
+
+
+def test_the_simulated_head_is_the_whole_graph_of_the_table():
+    assert {name for name, _ in nodes("sim.launch.py")} == set(graph(SIMULATED))
 
 
 @pytest.mark.parametrize(
@@ -63,18 +67,18 @@ def test_the_detector_runs_where_it_is_asked_for(file, arguments, runs, rests):
     [("", "/left/camera_node"), ("head", "/head/left/camera_node"), ("/a/b", "/a/b/left/camera_node")],
 )
 def test_the_right_camera_follows_the_left_ones_held_exposure(namespace, partner):
-    cameras = [told for name, told in nodes("rig.launch.py", **CAMERAS, namespace=namespace) if name == "camera_node"]
-    assert [told["lock"] for told in cameras] == ["hold", "follow"]
-    assert [told["partner"] for told in cameras] == ["", partner]
-    assert [told["device"] for told in cameras] == ["/dev/video0", "0"]
+    cameras = [given for name, given in nodes("rig.launch.py", **CAMERAS, namespace=namespace) if name == "camera_node"]
+    assert [given["lock"] for given in cameras] == ["hold", "follow"]
+    assert [given["partner"] for given in cameras] == ["", partner]
+    assert [given["device"] for given in cameras] == ["/dev/video0", "0"]
 
 
 def test_the_lock_can_be_left_off():
-    cameras = [told for name, told in nodes("rig.launch.py", **CAMERAS, lock="false") if name == "camera_node"]
-    assert [told["lock"] for told in cameras] == ["off", "off"]
+    cameras = [given for name, given in nodes("rig.launch.py", **CAMERAS, lock="false") if name == "camera_node"]
+    assert [given["lock"] for given in cameras] == ["off", "off"]
 
 
 def test_a_model_of_ones_own_reaches_the_detector():
     arguments = {**CAMERAS, "detector": "true", "model": "/models/fruit.onnx"}
-    (told,) = (told for name, told in nodes("rig.launch.py", **arguments) if name == "box_metric_node")
-    assert told["detector.model"] == "/models/fruit.onnx"
+    (given,) = (given for name, given in nodes("rig.launch.py", **arguments) if name == "box_metric_node")
+    assert given["detector.model"] == "/models/fruit.onnx"

@@ -30,11 +30,11 @@ def filled() -> dict[str, Stream]:
     state.version_rad, state.distance_m, state.distance_high_m = math.radians(5.0), 0.5, math.inf
     for i in range(31):
         at_s = 9.0 + i / 30
-        made["joint_states"].take(JointState(name=["pan_left", "tilt"], position=[0.5, 0.49]), at_s)
-        made["joint_command"].take(JointState(name=["pan_left"], position=[0.25]), at_s)
-    made["vergence/edge"].take(edge, 10.0)
-    made["vergence/error"].take(VergenceError(horizontal_px=-3.5, confidence=0.9, estimator="zncc"), 10.0)
-    made["gaze/state"].take(state, 10.0)
+        made["joint_states"].add(JointState(name=["pan_left", "tilt"], position=[0.5, 0.49]), at_s)
+        made["joint_command"].add(JointState(name=["pan_left"], position=[0.25]), at_s)
+    made["vergence/edge"].add(edge, 10.0)
+    made["vergence/error"].add(VergenceError(horizontal_px=-3.5, confidence=0.9, estimator="zncc"), 10.0)
+    made["gaze/state"].add(state, 10.0)
     return made
 
 

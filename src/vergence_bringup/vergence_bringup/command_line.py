@@ -1,4 +1,4 @@
-"""The `vergence` command: one subcommand per file, imported only when it is asked for."""
+"""The `vergence` command: one module per subcommand, imported only when that subcommand runs."""
 
 import argparse
 import importlib
@@ -7,26 +7,26 @@ from collections.abc import Sequence
 
 COMMANDS = {
     "demo": ("vergence_bringup.demo.ros.command", "run the whole graph on the simulated head and write a report"),
-    "measure": ("vergence_bringup.commands.measure", "metric I (and II) of two stored images"),
+    "measure": ("vergence_bringup.commands.measure", "compute metric I (and II) of two stored images"),
     "calibrate": ("vergence_bringup.commands.calibrate", "calibrate the cameras from chessboard or ChArUco views"),
     "identify": (
         "vergence_calibration.ros.identify",
-        "latencies, pixels per radian and signs of a running head, into its YAML",
+        "measure latencies, pixels per radian and signs of a running head and write them to YAML",
     ),
-    "watch": ("vergence_bringup.ros.watch", "live terminal view of a running graph"),
-    "doctor": ("vergence_bringup.commands.doctor", "say what is missing on this machine and how to mend it"),
+    "watch": ("vergence_bringup.ros.watch", "show a running graph in the terminal"),
+    "doctor": ("vergence_bringup.commands.doctor", "check this machine: what is missing, and how to install it"),
 }
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run one subcommand and return its exit status: 0 done, 1 the answer is no, 2 bad input."""
+    """Run one subcommand and return its exit status: 0 success, 1 a check failed, 2 invalid input."""
     arguments = list(sys.argv[1:] if args is None else args)
     parser = argparse.ArgumentParser(prog="vergence", description="Tools of the Vergence binocular head.")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    asked = next((argument for argument in arguments if not argument.startswith("-")), None)
+    given = next((argument for argument in arguments if not argument.startswith("-")), None)
     for name, (module_name, summary) in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=summary, description=summary)
-        if name == asked:
+        if name == given:
             module = importlib.import_module(module_name)
             module.add_arguments(subparser)
             subparser.set_defaults(run=module.run)

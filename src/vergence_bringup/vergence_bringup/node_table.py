@@ -28,7 +28,7 @@ NODES: dict[str, NodeEntry] = {
     "camera_node": NodeEntry("vergence_camera", "vergence_camera.parameters:GROUPS", heads=(REAL,)),
     "edge_metric_node": NodeEntry("vergence_metric", "vergence_metric.measurement.parameters:GROUPS"),
     "eye_rotation_node": NodeEntry("vergence_metric", "vergence_metric.eye_rotation.parameters:GROUPS"),
-    "gaze_controller_node": NodeEntry("vergence_gaze", "vergence_gaze.parameters:GROUPS"),
+    "gaze_controller_node": NodeEntry("vergence_gaze", "vergence_gaze.parameter_groups:GROUPS"),
     "photo_node": NodeEntry("vergence_sim", "vergence_sim.photo.parameters:GROUPS", heads=()),
     "servo_node": NodeEntry("vergence_servo", "vergence_servo.parameters:GROUPS", heads=(REAL,)),
     "sim_node": NodeEntry("vergence_sim", "vergence_sim.parameters:GROUPS", heads=(SIMULATED,)),

@@ -1,4 +1,4 @@
-"""`vergence calibrate`: what can be calibrated, each in a file of its own."""
+"""`vergence calibrate`: dispatches to the kinds of calibration."""
 
 import argparse
 

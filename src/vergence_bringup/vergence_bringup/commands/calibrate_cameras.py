@@ -22,11 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.description = (
         "Calibrate the cameras with a chessboard or ChArUco board. With --left and --right the views are read from "
-        "files, pair by pair; without, they are taken live from the running camera nodes (Ctrl-C ends the taking)."
+        "files, pair by pair; without, they come live from the running camera nodes (Ctrl-C ends the collection)."
     )
-    parser.add_argument("--left", nargs="+", type=Path, metavar="FILE", help="pictures of the left eye")
+    parser.add_argument("--left", nargs="+", type=Path, metavar="FILE", help="images of the left eye")
     parser.add_argument(
-        "--right", nargs="+", type=Path, metavar="FILE", help="pictures of the right eye, in that order"
+        "--right", nargs="+", type=Path, metavar="FILE", help="images of the right eye, in the order of the left ones"
     )
     parser.add_argument(
         "--board",
@@ -35,32 +35,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--square-m", type=float, default=0.025, metavar="M", help="side of a square (default: 0.025)")
     parser.add_argument("--marker-m", type=float, metavar="M", help="side of a marker (default: 3/4 of a square)")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where the three YAML files go")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the three YAML files")
     live = parser.add_argument_group("live")
-    live.add_argument("--views", type=int, default=25, metavar="N", help="how many views to take (default: 25)")
-    live.add_argument("--eyes", choices=("both", "left", "right"), default="both", help="which to calibrate")
+    live.add_argument("--views", type=int, default=25, metavar="N", help="number of views to collect (default: 25)")
+    live.add_argument(
+        "--eyes", choices=("both", "left", "right"), default="both", help="cameras to calibrate (default: both)"
+    )
     live.add_argument(
         "--topics",
         nargs=2,
         default=("left/image_raw/compressed", "right/image_raw/compressed"),
         metavar=("LEFT", "RIGHT"),
-        help="topics of the pictures; those that end in /compressed carry JPEG",
+        help="image topics; one that ends in /compressed carries JPEG",
     )
-    live.add_argument("--max-skew-s", type=float, default=0.02, metavar="S", help="largest time apart of a pair")
+    live.add_argument(
+        "--max-skew-s",
+        type=float,
+        default=0.02,
+        metavar="S",
+        help="largest difference of a pair's stamps (default: 0.02)",
+    )
 
 
 def run(args: argparse.Namespace, say: Say = print) -> int:
-    """Calibrate, print what came of it and write the files; 0 if they were written, 2 for input that cannot be."""
+    """Calibrate, print the results and write the files; 0 if they were written, 2 for invalid input."""
     try:
         board = parse_board(args.board, args.square_m, args.marker_m)
         if args.left or args.right:
             collector = _from_files(ViewCollector(board), args.left or [], args.right or [], say)
         else:
-            # Live, the board has to be carried somewhere new before a view counts again.
+            # Live, a view counts only where the board has moved since the last one.
             collector = collect_live(ViewCollector(board, least_change=0.04), args, say)
         cameras, pose = _solve(collector, say)
-        described = {"pattern": args.board, "square_m": args.square_m}
-        for path in write_results(args.out, cameras, pose, described):
+        board_values = {"pattern": args.board, "square_m": args.square_m}
+        for path in write_results(args.out, cameras, pose, board_values):
             say(f"wrote {path}")
     except (BoardError, SolveError, OSError) as error:
         print(f"vergence calibrate cameras: {error}", file=sys.stderr)
@@ -70,7 +78,7 @@ def run(args: argparse.Namespace, say: Say = print) -> int:
 
 def _from_files(collector: ViewCollector, left: Sequence[Path], right: Sequence[Path], say: Say) -> ViewCollector:
     if left and right and len(left) != len(right):
-        raise BoardError(f"there are {len(left)} left and {len(right)} right files: each left one needs its right one")
+        raise BoardError(f"--left and --right must have equally many files: got {len(left)} and {len(right)}")
     total = max(len(left), len(right))
     for number, pair in enumerate(zip_longest(left, right), start=1):
         files = {eye: file for eye, file in zip(EYES, pair, strict=True) if file is not None}
@@ -79,11 +87,11 @@ def _from_files(collector: ViewCollector, left: Sequence[Path], right: Sequence[
         pictures = {eye: np.asarray(picture) for eye, picture in read.items() if picture is not None}
         unreadable = [str(files[eye]) for eye in files if eye not in pictures]
         if unreadable:
-            verdict = Verdict(name, False, f"cannot be read: {', '.join(unreadable)}")
+            verdict = Verdict(name, False, f"not readable as images: {', '.join(unreadable)}")
             collector.verdicts.append(verdict)
         else:
             verdict = collector.offer(name, pictures)
-        say(f"[{number}/{total}] {name}: " + ("taken" if verdict.accepted else f"rejected: {verdict.reason}"))
+        say(f"[{number}/{total}] {name}: " + ("accepted" if verdict.accepted else f"rejected: {verdict.reason}"))
     return collector
 
 
@@ -98,11 +106,13 @@ def _solve(collector: ViewCollector, say: Say) -> tuple[dict[str, Intrinsics], S
         sound = [view for view in collector.views if view.name not in left_out]
         pose = solve_pair(sound, cameras["left"], cameras["right"])
         say(pose_text(pose))
-    _say_rejected(collector, cameras, pose, say)
+    _report_rejected(collector, cameras, pose, say)
     return cameras, pose
 
 
-def _say_rejected(collector: ViewCollector, cameras: dict[str, Intrinsics], pose: StereoPose | None, say: Say) -> None:
+def _report_rejected(
+    collector: ViewCollector, cameras: dict[str, Intrinsics], pose: StereoPose | None, say: Say
+) -> None:
     rejected = [(verdict.name, verdict.reason) for verdict in collector.verdicts if not verdict.accepted]
     for found in cameras.values():
         rejected += found.rejected.items()

@@ -1,4 +1,4 @@
-"""`vergence doctor`: what is missing on this machine, and how to mend it."""
+"""`vergence doctor`: checks what this machine lacks, and how to install it."""
 
 import argparse
 import ctypes.util
@@ -19,16 +19,16 @@ from vergence_bringup.node_table import NODES
 from vergence_bringup.ros.processes import config_dir, find_node
 from vergence_rig.finding import Finding
 
-_SHM_WANTED_MB = 64  # two cameras, three readers and slack, in segments of 16 MiB
+_SHM_NEEDED_MB = 64  # two cameras, three readers and slack, in segments of 16 MiB
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the subcommand."""
-    parser.add_argument("--no-render", action="store_true", help="skip the trial rendering (it takes two seconds)")
+    parser.add_argument("--no-render", action="store_true", help="skip the rendering test (it takes two seconds)")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print every finding; 0 if nothing that is needed is missing."""
+    """Print every finding; 0 if all required checks passed."""
     findings = list(examine(render=not options.no_render))
     for finding in findings:
         mark = "ok  " if finding.ok else ("FAIL" if finding.needed else "note")
@@ -36,12 +36,12 @@ def run(options: argparse.Namespace) -> int:
         if not finding.ok and finding.mend:
             print(f"      -> {finding.mend}")
     missing = sum(not finding.ok and finding.needed for finding in findings)
-    print(f"\n{missing} thing{'s' * (missing != 1)} to mend" if missing else "\nnothing that is needed is missing")
+    print(f"\n{missing} required check{'s' * (missing != 1)} failed" if missing else "\nall required checks passed")
     return 1 if missing else 0
 
 
 def examine(render: bool = True) -> Iterable[Finding]:
-    """Yield a finding for everything the nodes, the demo or a build rely on."""
+    """Yield a finding for everything that nodes, demo and build depend on."""
     yield from _guarded("python", _python)
     yield from _guarded("compiler", _compiler)
     yield from _guarded("ros", _ros)
@@ -53,11 +53,11 @@ def examine(render: bool = True) -> Iterable[Finding]:
     yield from _guarded("cameras", _cameras)
 
 
-def _guarded(name: str, look: Callable[[], Iterable[Finding]]) -> Iterable[Finding]:
+def _guarded(name: str, check: Callable[[], Iterable[Finding]]) -> Iterable[Finding]:
     try:
-        yield from look()
-    except Exception as error:  # the doctor must not fall ill himself
-        yield Finding(name, False, f"could not be examined: {type(error).__name__}: {error}", needed=False)
+        yield from check()
+    except Exception as error:  # a check must never raise
+        yield Finding(name, False, f"the check failed: {type(error).__name__}: {error}", needed=False)
 
 
 def _python() -> Iterable[Finding]:
@@ -66,13 +66,13 @@ def _python() -> Iterable[Finding]:
     yield Finding("python", good, f"{version} at {sys.executable}", "use Python 3.10 to 3.14: make setup PYTHON=...")
     wanted = {"numpy": "numpy", "cv2": "opencv-python-headless", "yaml": "PyYAML", "onnxruntime": "onnxruntime"}
     absent = [package for module, package in wanted.items() if importlib.util.find_spec(module) is None]
-    found = "all there" if not absent else "missing: " + ", ".join(absent)
+    found = "all installed" if not absent else "missing: " + ", ".join(absent)
     yield Finding("python packages", not absent, found, f"pip install {' '.join(absent)}, or make setup")
 
 
 def _compiler() -> Iterable[Finding]:
     absent = [tool for tool in ("gcc", "g++", "make") if shutil.which(tool) is None]
-    message = "gcc, g++ and make are there" if not absent else "missing: " + ", ".join(absent)
+    message = "gcc, g++ and make are installed" if not absent else "missing: " + ", ".join(absent)
     yield Finding("compiler", not absent, message, "apt install build-essential (the messages are compiled)")
     header = Path(sysconfig.get_paths()["include"]) / "Python.h"
     yield Finding("python headers", header.exists(), str(header), "apt install python3-dev")
@@ -80,10 +80,10 @@ def _compiler() -> Iterable[Finding]:
 
 def _ros() -> Iterable[Finding]:
     where = "apt, /opt/ros/jazzy" if Path("/opt/ros/jazzy").exists() else "wheels in this environment"
-    there = importlib.util.find_spec("rclpy") is not None
-    yield Finding("rclpy", there, where if there else "cannot be imported", "make setup, then source env.sh")
+    found = importlib.util.find_spec("rclpy") is not None
+    yield Finding("rclpy", found, where if found else "cannot be imported", "make setup, then source env.sh")
     distro = os.environ.get("ROS_DISTRO", "jazzy")
-    yield Finding("ROS distribution", distro == "jazzy", distro, "this workspace is written for Jazzy")
+    yield Finding("ROS distribution", distro == "jazzy", distro, "use ROS 2 Jazzy: this workspace is built for it")
 
 
 def _nodes() -> Iterable[Finding]:
@@ -103,12 +103,12 @@ def _middleware() -> Iterable[Finding]:
     mend = f"source env.sh, or export FASTRTPS_DEFAULT_PROFILES_FILE={shipped}"
     if os.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp") != "rmw_fastrtps_cpp":
         name = os.environ["RMW_IMPLEMENTATION"]
-        yield Finding("DDS", True, f"{name}: the shipped Fast DDS profile is not used", needed=False)
+        yield Finding("DDS", True, f"{name} is used: the shipped Fast DDS profile has no effect", needed=False)
     elif profile is None:
-        message = "profile not set: raw image pairs would be lost or late"
+        message = "FASTRTPS_DEFAULT_PROFILES_FILE is not set: most raw image pairs will be lost or late"
         yield Finding("DDS profile", False, message, mend)
     elif not Path(profile).is_file():
-        yield Finding("DDS profile", False, f"{profile} is not there", mend)
+        yield Finding("DDS profile", False, f"no such file: {profile}", mend)
     else:
         yield Finding("DDS profile", True, profile)
     reach = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET (ROS's own default)")
@@ -119,19 +119,19 @@ def _middleware() -> Iterable[Finding]:
 def _shared_memory() -> Iterable[Finding]:
     usage = shutil.disk_usage("/dev/shm")
     free_mb = usage.free / 2**20
-    message = f"/dev/shm has {free_mb:.0f} of {usage.total / 2**20:.0f} MiB free, {_SHM_WANTED_MB} are wanted"
+    message = f"/dev/shm has {free_mb:.0f} of {usage.total / 2**20:.0f} MiB free, {_SHM_NEEDED_MB} are needed"
     mend = "mount -o remount,size=512M /dev/shm (in a container: --shm-size=512m)"
-    yield Finding("shared memory", free_mb >= _SHM_WANTED_MB, message, mend)
+    yield Finding("shared memory", free_mb >= _SHM_NEEDED_MB, message, mend)
 
 
-def _rendering(trial: bool) -> Iterable[Finding]:
+def _rendering(test: bool) -> Iterable[Finding]:
     if importlib.util.find_spec("mujoco") is None:
         yield Finding("simulator", False, "mujoco is not installed", "pip install mujoco (only sim_node needs it)")
         return
     library = ctypes.util.find_library("EGL")
     mend = "apt install libegl1 libgl1-mesa-dri (only sim_node needs it)"
     yield Finding("libEGL", library is not None, library or "not found", mend)
-    if not trial or library is None:
+    if not test or library is None:
         return
     code = "import mujoco; c = mujoco.GLContext(8, 8); c.make_current(); print(mujoco.__version__)"
     env = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL", "egl")}
@@ -148,9 +148,9 @@ def _groups() -> Iterable[Finding]:
         if group not in {entry.gr_name for entry in grp.getgrall()}:
             continue
         member = os.geteuid() == 0 or group in mine
-        message = f"{purpose}: this user is {'' if member else 'not '}allowed"
+        message = f"access to {purpose}: this user is {'' if member else 'not '}in the group"
         yield Finding(
-            f"group {group}", member, message, f"sudo usermod -aG {group} $USER, then log in anew", needed=False
+            f"group {group}", member, message, f"sudo usermod -aG {group} $USER, then log in again", needed=False
         )
 
 
@@ -165,4 +165,4 @@ def _has_name(group_id: int) -> bool:
 def _cameras() -> Iterable[Finding]:
     doctor: Any = importlib.import_module("vergence_camera.doctor")
     for finding in doctor.check():
-        yield replace(finding, needed=False)  # recordings and the simulator do without
+        yield replace(finding, needed=False)  # recordings and the simulator need none

@@ -1,4 +1,4 @@
-"""`vergence measure`: the paper's flowchart on two stored images, and the boxes of a detector."""
+"""`vergence measure`: metric I of two stored images as in the paper's flowchart, and metric II with a detector."""
 
 import argparse
 import json
@@ -9,7 +9,8 @@ from pathlib import Path
 
 from vergence_bringup.figures.boxes import BoxFigures, corner_text, signed
 from vergence_bringup.figures.pictures import Image, combined_edges, read_image, write_image
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.alignment.parameters import AlignmentParameters
+from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric
 
 SHIPPED = "shipped"
@@ -17,8 +18,8 @@ SHIPPED = "shipped"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the subcommand."""
-    parser.add_argument("left", type=Path, metavar="LEFT", help="the left eye's image")
-    parser.add_argument("right", type=Path, metavar="RIGHT", help="the right eye's image, of the same size")
+    parser.add_argument("left", type=Path, metavar="LEFT", help="image of the left eye")
+    parser.add_argument("right", type=Path, metavar="RIGHT", help="image of the right eye, of the same size")
     parser.add_argument(
         "--out",
         type=Path,
@@ -28,30 +29,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         metavar="FILE",
-        help=f"add metric II with this ONNX detector; {SHIPPED!r} is the one for Rubik's cubes that comes with it",
+        help=f"add metric II with this ONNX detector; {SHIPPED!r} is the one for Rubik's cubes in this package",
     )
-    parser.add_argument("--json", action="store_true", help="one JSON object on standard output instead of the table")
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
     parser.add_argument("--windows", type=int, nargs="+", metavar="PX", help="sides of the centre windows in px")
     parser.add_argument(
         "--align",
         choices=("none", "auto"),
         default="none",
-        help="none: exactly the paper; auto: take vertical offset and roll out of the right image first",
+        help="none: exactly the paper; auto: correct vertical offset and roll of the right image first",
     )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure one pair, print it and write its pictures."""
-    parameters = EdgeMetricParameters().replaced(align=options.align)
-    if options.windows:
-        parameters = parameters.replaced(windows_px=tuple(options.windows))
+    """Measure one pair, print the result and write its images."""
+    edges = EdgeParameters(windows_px=tuple(options.windows)) if options.windows else EdgeParameters()
     left, right = read_image(options.left), read_image(options.right)
-    result = EdgeMetric(parameters).measure(left, right)
+    result = EdgeMetric(edges, alignment=AlignmentParameters(mode=options.align)).measure(left, right)
     if options.out is not None:
         write_image(options.out / "left_edges.png", result.left_edges.mask)
         write_image(options.out / "right_edges.png", result.right_edges.mask)
         write_image(options.out / "combined_edges.png", combined_edges(result.left_edges.mask, result.right_edges.mask))
-    # Before anything is printed: a model that cannot be used is one line, not one below a table.
+    # Before anything is printed, so that an unusable model gives one line of output.
     boxes = _boxes(left, right, options.model, options.out) if options.model is not None else None
     figures = {
         "windows_px": [int(size) for size in result.windows_px],
@@ -70,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
     if boxes is not None:
         _print_boxes(boxes)
     if options.out is not None:
-        print(f"pictures: {options.out}")
+        print(f"images: {options.out}")
     return 0
 
 
@@ -79,7 +78,7 @@ def _boxes(left: Image, right: Image, model: str, out: Path | None) -> BoxFigure
     from vergence_metric.boxes import draw, measure_pair
 
     if not model:
-        raise ValueError(f"--model is empty: allowed is the path of an ONNX file, or {SHIPPED}")
+        raise ValueError(f"--model must be the path of an ONNX file, or {SHIPPED}: got an empty string")
     result = measure_pair(left, right, "" if model == SHIPPED else model)
     if out is not None:
         write_image(out / "boxes.png", draw(left, right, result))

@@ -1,4 +1,4 @@
-"""The demo's report: one HTML file with its pictures and plots inside. No ROS in it."""
+"""The demo's report: one HTML file that contains its images and plots."""
 
 import base64
 import html
@@ -27,12 +27,12 @@ figure { margin: 0; } figure img { width: 100%; display: block; } figcaption { f
 
 
 def write_report(path: Path, results: Sequence[StationResult], settings: dict[str, Any], out_dir: Path) -> None:
-    """Write the report; pictures are read from `out_dir`/pictures, where the demo left them."""
+    """Write the report; images are read from `out_dir`/pictures, where the demo wrote them."""
     passed = sum(result.passed for result in results)
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'><title>Vergence demo</title>",
         f"<style>{_STYLE}</style></head><body><h1>Vergence demo</h1>",
-        f"<p>{passed} of {len(results)} stations verged, by the graph's word and by the simulator's truth. "
+        f"<p>{passed} of {len(results)} stations verged, as reported by the graph and confirmed by the ground truth. "
         f"Servos: {html.escape(str(settings['servo']))}, cameras: {html.escape(str(settings['cameras']))}, "
         f"{settings['duration_s']:g} s in all.</p>",
         _overview(results),
@@ -46,31 +46,40 @@ def write_report(path: Path, results: Sequence[StationResult], settings: dict[st
 def _overview(results: Sequence[StationResult]) -> str:
     rows = []
     for result in results:
-        verdict = _verdict(result.said_verged, "verged", "not verged")
+        verdict = _verdict(result.reported_verged, "verged", "not verged")
         truth = _verdict(result.truth_agrees, "agrees", "disagrees")
         rows.append(
             f"<tr><td><a href='#{result.name}'>{result.name}</a></td><td>{verdict}</td><td>{truth}</td>"
             f"<td>{_text(result.time_s)} s</td><td>{_text(result.true_error_deg)}&deg;</td>"
             f"<td>{_text(result.tolerance_deg)}&deg;</td><td>{_text(result.off_axis_deg)}&deg;</td></tr>"
         )
-    head = "<tr><th>station</th><th>graph says</th><th>truth</th><th>time to vergence</th><th>true vergence error</th>"
-    return f"<table>{head}<th>allowed</th><th>target off axis</th></tr>{''.join(rows)}</table>"
+    columns = (
+        "station",
+        "reported",
+        "ground truth",
+        "time to vergence",
+        "vergence error",
+        "tolerance",
+        "target off axis",
+    )
+    head = "".join(f"<th>{column}</th>" for column in columns)
+    return f"<table><tr>{head}</tr>{''.join(rows)}</table>"
 
 
 def _station(result: StationResult, pictures: Path) -> str:
     series = result.series
     vergence = plot(
-        "Vergence angle: what fixates the target, the true one, and what the controller believes",
+        "Vergence angle: the one that fixates the target, the true one, and the controller's estimate",
         "s",
         "deg",
         [
-            Line("wanted", series.truth_time_s, series.wanted_vergence_deg, "#17803d", dashed=True),
+            Line("target", series.truth_time_s, series.wanted_vergence_deg, "#17803d", dashed=True),
             Line("true", series.truth_time_s, series.true_vergence_deg, "#1d2530"),
-            Line("believed", series.state_time_s, series.vergence_deg, "#2563eb"),
+            Line("estimated", series.state_time_s, series.vergence_deg, "#2563eb"),
         ],
     )
     metric = plot(
-        "Metric I (mean of both directions, 100 px window) and contrast (1 unrelated, well below: verged)",
+        "Metric I (mean of both directions, 100 px window) and contrast (1: unrelated images, well below 1: verged)",
         "s",
         "px, 1",
         [
@@ -109,7 +118,7 @@ def _pictures(name: str, moment: str, caption: str, folder: Path) -> str:
     for kind, text, suffix in shown:
         file = folder / f"{name}_{moment}_{kind}.{suffix}"
         if not file.is_file():
-            continue  # the station came to an end before
+            continue  # the station was not completed
         mime = "jpeg" if suffix == "jpg" else "png"
         data = base64.b64encode(file.read_bytes()).decode("ascii")
         figures.append(
@@ -121,7 +130,7 @@ def _pictures(name: str, moment: str, caption: str, folder: Path) -> str:
 def _box_plot(series: Series) -> list[str]:
     if not len(series.box_time_s):
         return []
-    title = "Metric II: disparity of the boxes' centres and of the surface inside them, against the truth"
+    title = "Metric II: disparity of the boxes' centres and of the surface inside them, beside the ground truth"
     lines = [
         Line("true surface", series.truth_time_s, series.true_disparity_px, "#17803d", dashed=True),
         Line("boxes' centres", series.box_time_s, series.box_center_px, "#b45309"),

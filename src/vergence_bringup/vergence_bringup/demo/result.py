@@ -1,4 +1,4 @@
-"""What the demo measured at each station, its verdict, and how it is printed and stored. No ROS in it."""
+"""The demo's measurements at each station, their verdict, table and summary."""
 
 import json
 import math
@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MetricTable:
-    """Metric I of one pair; every array has one element a window. NaN where a window holds no edges."""
+    """Metric I of one pair; every array has one element per window, NaN where a window holds no edges."""
 
     windows_px: Sequence[int]
     left_to_right_px: Sequence[float]
@@ -32,13 +32,13 @@ def _empty() -> Floats:
 
 @dataclass(frozen=True)
 class Series:
-    """What happened over time; `time_s` counts from the goal."""
+    """Recorded series; times count from the goal."""
 
     time_s: Floats = field(default_factory=_empty)
     metric_px: Floats = field(default_factory=_empty)  # mean of both directions in the 100 px window, or the smallest
     contrast: Floats = field(default_factory=_empty)
     state_time_s: Floats = field(default_factory=_empty)
-    vergence_deg: Floats = field(default_factory=_empty)  # what the controller believes
+    vergence_deg: Floats = field(default_factory=_empty)  # the controller's estimate
     truth_time_s: Floats = field(default_factory=_empty)
     true_vergence_deg: Floats = field(default_factory=_empty)
     wanted_vergence_deg: Floats = field(default_factory=_empty)  # the vergence angle that fixates the target point
@@ -50,17 +50,20 @@ class Series:
 
 @dataclass(frozen=True)
 class StationResult:
-    """One station's outcome.
+    """The outcome at one station.
 
-    `verged`: the graph said so and went on saying so. `true_error_deg`: median of the true vergence error's magnitude
-    while it was held. `off_axis_deg`: how far the eye that looks past the target point most looks past it (median).
-    `tolerance_deg`: what the true error may be for the truth to agree.
+    Attributes:
+        reported_verged: the controller reported vergence and kept reporting it.
+        time_s: from the goal to the first report of vergence.
+        true_error_deg: median magnitude of the true vergence error during the hold.
+        off_axis_deg: angle between the target point and the optical axis of the worse eye, median.
+        tolerance_deg, off_axis_tolerance_deg: the largest of these that count as vergence.
     """
 
     name: str
     title: str
     moving: bool
-    said_verged: bool
+    reported_verged: bool
     reason: str
     time_s: float
     true_error_deg: float
@@ -77,14 +80,14 @@ class StationResult:
 
     @property
     def truth_agrees(self) -> bool:
-        """True if the simulator's truth agrees that both eyes are on the target."""
-        # NaN compares false: a truth that is not known agrees with nothing.
+        """True if by the ground truth both eyes are on the target."""
+        # NaN compares false: an unknown truth never agrees.
         return self.true_error_deg <= self.tolerance_deg and self.off_axis_deg <= self.off_axis_tolerance_deg
 
     @property
     def passed(self) -> bool:
-        """True if the graph said verged and the truth agrees."""
-        return self.said_verged and self.truth_agrees
+        """True if vergence was reported and the ground truth agrees."""
+        return self.reported_verged and self.truth_agrees
 
 
 _NO_TABLE = MetricTable((), (), (), ())
@@ -92,12 +95,12 @@ _NOWHERE = (math.nan, math.nan, math.nan)
 
 
 def unfinished(station: Station, reason: str) -> StationResult:
-    """Return the result of a station that came to nothing."""
+    """Return the result of a station that was not completed."""
     return StationResult(
         name=station.name,
         title=station.title,
         moving=station.moving,
-        said_verged=False,
+        reported_verged=False,
         reason=reason,
         time_s=math.nan,
         true_error_deg=math.nan,
@@ -121,7 +124,7 @@ def _numbers(values: Sequence[float]) -> list[float | None]:
 
 
 def summary(results: Sequence[StationResult], settings: dict[str, Any]) -> dict[str, Any]:
-    """Return what goes into summary.json; figures that are not known are null."""
+    """Return the content of summary.json; unknown figures are null."""
     return {
         "passed": bool(results) and all(result.passed for result in results),
         **settings,
@@ -129,7 +132,7 @@ def summary(results: Sequence[StationResult], settings: dict[str, Any]) -> dict[
             {
                 "name": result.name,
                 "title": result.title,
-                "verged": result.said_verged,
+                "verged": result.reported_verged,
                 "truth_agrees": result.truth_agrees,
                 "reason": result.reason,
                 "time_s": _number(result.time_s),
@@ -169,13 +172,15 @@ def _figure(value: float, digits: int) -> str:
 
 
 def table(results: Sequence[StationResult]) -> str:
-    """Return the table for the terminal: the verdicts, metric I at start and end for every window, and metric II."""
-    lines = [f"{'station':16} {'graph':10} {'truth':9} {'time':>6} {'true error':>11} {'off axis':>9}   metric in px"]
+    """Return the terminal's table: verdicts, metric I at start and end for every window, and metric II."""
+    lines = [
+        f"{'station':16} {'reported':10} {'truth':9} {'time':>6} {'true error':>11} {'off axis':>9}   metric in px"
+    ]
     for result in results:
-        said = "verged" if result.said_verged else "NOT VERGED"
+        reported = "verged" if result.reported_verged else "NOT VERGED"
         truth = "agrees" if result.truth_agrees else "DISAGREES"
         lines.append(
-            f"{result.name:16} {said:10} {truth:9} {_figure(result.time_s, 2):>5}s"
+            f"{result.name:16} {reported:10} {truth:9} {_figure(result.time_s, 2):>5}s"
             f" {_figure(result.true_error_deg, 2):>7} deg {_figure(result.off_axis_deg, 2):>5} deg"
             f"   window {' '.join(f'{size:>6}' for size in result.start.windows_px)}"
         )

@@ -1,4 +1,4 @@
-"""What the demo looks at: the paper's two experiments, then targets anywhere and one that moves. No ROS in it."""
+"""The demo's stations: the paper's two experiments, targets at other places, and a moving one."""
 
 import math
 from collections.abc import Mapping
@@ -23,16 +23,16 @@ class Station:
     """One target to verge on.
 
     Attributes:
-        name: as the table, the pictures and summary.json call it.
+        name: its name in the table, the images and summary.json.
         title: one line for the report.
         target: the simulator's object, "cube" or "marker".
-        place_m: its centre in rig_base; None puts it where the graph itself computed the fixation point.
+        place_m: its centre in rig_base [m]; None for the fixation point that the controller computed.
         mode: the controller's mode, left_held (the paper's) or both_eyes.
-        start_version_deg, start_vergence_deg, start_tilt_deg: where the eyes are sent before the target is shown.
+        start_version_deg, start_vergence_deg, start_tilt_deg: the eyes' angles before the target is shown.
         by_class: the goal is the detected class `target` instead of a click on it.
-        distractor_m: where the simulator's distractor stands meanwhile; None for none.
-        motion: the simulator's motion parameters by name; empty for a target that rests.
-        hold_s: how long it must stay verged.
+        distractor_m: place of the simulator's distractor in rig_base [m]; None for none.
+        motion: the simulator's motion parameters by name; empty for a static target.
+        hold_s: time for which the eyes must stay verged.
     """
 
     name: str
@@ -50,12 +50,12 @@ class Station:
 
     @property
     def moving(self) -> bool:
-        """True if the target moves while it is looked at."""
+        """True if the target moves."""
         return bool(self.motion)
 
     @property
     def has_boxes(self) -> bool:
-        """True if metric II sees the target: the shipped detector knows the cube alone."""
+        """True if metric II can measure the target: the shipped detector's only class is the cube."""
         return self.target == "cube"
 
 
@@ -90,11 +90,11 @@ def marker_80_80() -> Station:
     )
 
 
-def cube_told_apart() -> Station:
-    """Return the detector's own station: a nearer thing like the cube stands before the eyes, the cube is asked for."""
+def cube_with_distractor() -> Station:
+    """Return the detector's station: the goal is the class cube, and a look-alike is nearer than the cube."""
     return Station(
-        "cube_told_apart",
-        "0.65 m, asked for by its class; a puzzle of 4 by 4 cells stands nearer, and nearer to where the eyes look",
+        "cube_distractor",
+        "0.65 m, given by its class; a puzzle of 4 by 4 cells is nearer to the head and to the gaze",
         "cube",
         _at(0.65, 8.0, 3.0),
         by_class=True,
@@ -103,7 +103,7 @@ def cube_told_apart() -> Station:
 
 
 def stations(baseline_m: float, short: bool = False) -> list[Station]:
-    """Return the demo's stations in order; the short demo has the paper's, one that is free, and the one that moves."""
+    """Return the demo's stations in order; the short demo has the paper's first, one more and the moving one."""
     free = [
         Station("cube_near_left", "0.4 m, 10 degrees left", "cube", _at(0.4, 10.0, 0.0)),
         Station("cube_right_up", "0.7 m, 20 degrees right, 10 up", "cube", _at(0.7, -20.0, 10.0)),
@@ -112,7 +112,7 @@ def stations(baseline_m: float, short: bool = False) -> list[Station]:
     ]
     moving = Station(
         "cube_moving",
-        "0.6 m, moving to and fro across the line of sight",
+        "0.6 m, oscillating across the line of sight",
         "cube",
         _at(0.6, 0.0, 0.0),
         motion={"motion.kind": "sinusoid", "motion.y_m": 0.06, "motion.frequency_hz": 0.12},
@@ -120,4 +120,4 @@ def stations(baseline_m: float, short: bool = False) -> list[Station]:
     )
     if short:
         return [cube_held(baseline_m), free[1], moving]
-    return [cube_held(baseline_m), marker_80_80(), *free, cube_told_apart(), moving]
+    return [cube_held(baseline_m), marker_80_80(), *free, cube_with_distractor(), moving]

@@ -1,4 +1,4 @@
-"""The round of the demo's stations: what goes wrong at one becomes its reason, and the demo goes on. No ROS in it."""
+"""Visits the demo's stations; a failure at one becomes its reason, and the demo continues."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -10,28 +10,28 @@ from vergence_bringup.graph_errors import GraphError, ProcessError
 
 
 class Runner(Protocol):
-    """Visits stations, as `demo_run.StationRunner` does."""
+    """Visits stations, as `station_runner.StationRunner` does."""
 
     def wait_until_ready(self) -> None:
-        """Wait until every node has been heard; raises GraphError or ProcessError."""
+        """Wait until every node publishes; raises GraphError or ProcessError."""
 
     def visit(self, station: Station) -> StationResult:
-        """Return what happened at a station; raises GraphError or ProcessError."""
+        """Return the result of a station; raises GraphError or ProcessError."""
 
 
 def visit_all(
     runner: Runner, stations: Sequence[Station], results: list[StationResult], say: Callable[[str], None]
 ) -> None:
-    """Visit one station after the other and append each result as it comes.
+    """Visit one station after the other and append each result.
 
-    A station at which the graph does not answer has failed, with that reason, and the next is tried. A process that has
-    ended by itself, and a graph that never gets ready, fail every station that is left.
+    A station at which the graph does not answer fails with that reason, and the next one follows. A process that has
+    ended, and a graph that does not start, fail every remaining station.
     """
     say("waiting for images, metrics and controller")
     try:
         runner.wait_until_ready()
     except (GraphError, ProcessError) as error:
-        say(f"the graph did not get ready: {error}")
+        say(f"the graph did not start: {error}")
         results += [unfinished(station, f"not visited: {_first_line(error)}") for station in stations]
         return
     for number, station in enumerate(stations, 1):
@@ -50,11 +50,11 @@ def visit_all(
 
 
 def _verdict(result: StationResult) -> str:
-    said = "verged" if result.said_verged else f"NOT verged ({result.reason})"
+    reported = "verged" if result.reported_verged else f"NOT verged ({result.reason})"
     took = f" after {result.time_s:.2f} s" if math.isfinite(result.time_s) else ""
     truth = "agrees" if result.truth_agrees else "DISAGREES"
     error = f"{result.true_error_deg:.2f}" if math.isfinite(result.true_error_deg) else "unknown"
-    return f"graph: {said}{took}; truth {truth}: vergence error {error} degree"
+    return f"reported {reported}{took}; ground truth {truth}: vergence error {error} degrees"
 
 
 def _first_line(error: Exception) -> str:

@@ -1,4 +1,4 @@
-"""Pictures of pairs and their edges, for files and reports. No ROS in it."""
+"""Images of pairs and their edges, for files and reports."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,28 +15,30 @@ _INK_BGR = (80, 230, 80)
 
 
 class PictureError(ValueError):
-    """A picture that cannot be read or written."""
+    """An image cannot be read or written."""
 
 
 def read_image(path: Path) -> Image:
-    """Return an image file as (h, w, 3) BGR uint8; raises PictureError where it is none."""
+    """Return an image file as (h, w, 3) BGR uint8; raises PictureError where it cannot be decoded."""
     if not path.is_file():
         raise PictureError(f"image {path}: no such file")
     image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR) if path.stat().st_size else None
     if image is None:
-        raise PictureError(f"image {path}: allowed is a whole PNG, JPEG or another format that OpenCV reads")
+        raise PictureError(
+            f"image {path} must be a complete PNG, JPEG or another format that OpenCV reads: it cannot be decoded"
+        )
     return np.asarray(image, np.uint8)
 
 
 def write_image(path: Path, image: npt.NDArray[Any]) -> None:
-    """Write an image, its folder with it; raises PictureError where that is not possible."""
+    """Write an image and create its folder; raises PictureError where that fails."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if not cv2.imwrite(str(path), image):
         raise PictureError(f"image {path}: cannot be written")
 
 
 def combined_edges(left_mask: npt.NDArray[Any], right_mask: npt.NDArray[Any]) -> Image:
-    """Return both edge masks (h, w) in one BGR picture: left red, right cyan, both white."""
+    """Return both edge masks (h, w) in one BGR image: left red, right cyan, both white."""
     picture = np.zeros((*left_mask.shape, 3), np.uint8)
     picture[left_mask > 0, 2] = 255
     picture[right_mask > 0, :2] = 255
@@ -54,7 +56,7 @@ def with_windows(picture: Image, windows_px: Sequence[int]) -> Image:
 
 
 def with_cross(picture: Image) -> Image:
-    """Return a copy with a cross where the optical axis is: the image's centre."""
+    """Return a copy with a cross at the image's centre."""
     marked = picture.copy()
     centre = (marked.shape[1] // 2, marked.shape[0] // 2)
     cv2.drawMarker(marked, centre, (0, 0, 0), cv2.MARKER_CROSS, 25, 3)
@@ -70,7 +72,7 @@ def with_box(picture: Image, xyxy_px: Sequence[float], label: str) -> Image:
     cv2.rectangle(marked, (x_min, y_min), (x_max, y_max), _INK_BGR, 1)
     (width, height), _ = cv2.getTextSize(label, _FONT, 0.42, 1)
     x, y = x_min, max(y_min - 6, height + 3)
-    # A ground of its own: OpenCV 5 spaces a broader outline of the same text differently.
+    # A filled background: OpenCV 5 spaces an outline of the same text differently.
     cv2.rectangle(marked, (x - 2, y - height - 3), (x + width + 2, y + 3), (0, 0, 0), -1)
     cv2.putText(marked, label, (x, y), _FONT, 0.42, _INK_BGR, 1, cv2.LINE_AA)
     return marked

@@ -1,4 +1,4 @@
-"""Line plots as inline SVG: enough for a report, with nothing to install."""
+"""Line plots as inline SVG, without a plotting library."""
 
 import html
 import math

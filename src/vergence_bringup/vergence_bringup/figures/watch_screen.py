@@ -1,4 +1,4 @@
-"""What `vergence watch` shows: lines of text from the newest messages. No rclpy, no terminal."""
+"""The screen of `vergence watch`: lines of text from the newest messages."""
 
 import math
 from collections import deque
@@ -21,14 +21,14 @@ class Stream:
     count: int = 0
     _arrivals_s: deque[float] = field(default_factory=lambda: deque(maxlen=512))
 
-    def take(self, message: Any, now_s: float) -> None:
-        """Keep a message that arrived now."""
+    def add(self, message: Any, now_s: float) -> None:
+        """Store a message that arrived at `now_s`."""
         self.message, self.arrived_s = message, now_s
         self.count += 1
         self._arrivals_s.append(now_s)
 
     def rate_hz(self, now_s: float) -> float:
-        """Return messages a second over the last seconds; 0 for silence."""
+        """Return the rate of messages over the last 3 s; 0 if there were none."""
         while self._arrivals_s and now_s - self._arrivals_s[0] > _RATE_WINDOW_S:
             self._arrivals_s.popleft()
         if len(self._arrivals_s) < 2:
@@ -38,7 +38,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everything known at one moment: monotonic and wall time [s], streams by topic, health by diagnostic name."""
+    """State at one moment: monotonic and wall time [s], streams by topic, health by diagnostic name."""
 
     now_s: float
     wall_s: float
@@ -115,17 +115,17 @@ class Screen:
             yield (("dim", "  no joint_states yet"),)
             return
         command = snapshot.streams["joint_command"]
-        wanted: dict[str, float] = {}
+        commands: dict[str, float] = {}
         if command.message is not None and snapshot.now_s - command.arrived_s < _STALE_S:
-            wanted = dict(zip(command.message.name, command.message.position, strict=False))
+            commands = dict(zip(command.message.name, command.message.position, strict=False))
         stale = snapshot.now_s - stream.arrived_s >= _STALE_S
         for name, position in zip(stream.message.name, stream.message.position, strict=False):
             low, high = self._limits.get(name, (-math.pi, math.pi))
             near = position - low < 0.02 or high - position < 0.02
             style = "dim" if stale else "warn" if near else ""
-            asked = f" -> {_degrees(wanted[name])}" if name in wanted else ""
+            commanded = f" -> {_degrees(commands[name])}" if name in commands else ""
             ends = f"{_degrees(low)} [{_bar(position, low, high, 24)}] {_degrees(high)}"
-            yield ((style, f"  {name:<10} {_degrees(position)}  {ends}{asked}"),)
+            yield ((style, f"  {name:<10} {_degrees(position)}  {ends}{commanded}"),)
 
     def _topics(self, snapshot: Snapshot) -> Iterator[tuple[tuple[str, str], ...]]:
         for topic, stream in snapshot.streams.items():

@@ -1,1 +1,1 @@
-"""The ROS rim: nodes and message conversion."""
+"""Nodes, processes and everything else that needs ROS."""

@@ -1,4 +1,4 @@
-"""Views of the board from the running cameras, taken while the user carries it around."""
+"""Collects views of the calibration board from the running cameras while the user moves it."""
 
 import argparse
 import sys
@@ -12,9 +12,9 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, Image
+from vergence_receivedra.calibration.boards import BoardError, Detection
+from vergence_receivedra.calibration.views import EYES, View, ViewCollector
 
-from vergence_camera.calibration.boards import BoardError, Detection
-from vergence_camera.calibration.views import EYES, View, ViewCollector
 from vergence_common.images import ImageError, compressed_to_array, image_to_array
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_seconds
@@ -26,7 +26,7 @@ _SILENCE_S = 5.0
 
 
 class LiveViews(Node):
-    """Offers every pair of pictures to a collector and keeps those in which the board holds still."""
+    """Offers every pair of images to a collector and keeps those in which the board is still."""
 
     def __init__(
         self,
@@ -37,26 +37,26 @@ class LiveViews(Node):
         say: Callable[[str], None],
         **node_options: Any,
     ) -> None:
-        super().__init__("calibrate_cameras", **node_options)
+        super().__init__("calibrate_receivedras", **node_options)
         self._collector, self._wanted, self._max_skew_s, self._say = collector, wanted, max_skew_s, say
         self._newest: dict[str, tuple[float, Picture]] = {}
         self._previous: dict[str, Detection] = {}
-        self._eyes, self._offered, self._came = tuple(topics), 0, Counter[str]()
+        self._eyes, self._offered, self._received = tuple(topics), 0, Counter[str]()
         self.done = rclpy.task.Future()
         for eye, topic in topics.items():
             kind = CompressedImage if topic.endswith("/compressed") else Image
-            self.create_subscription(kind, topic, lambda message, eye=eye: self._take(eye, message), IMAGE_QOS)
+            self.create_subscription(kind, topic, lambda message, eye=eye: self._on_image(eye, message), IMAGE_QOS)
         self._topics = topics
-        self.create_timer(_SILENCE_S, self._complain)
+        self.create_timer(_SILENCE_S, self._report_silence)
 
-    def _take(self, eye: str, message: Image | CompressedImage) -> None:
+    def _on_image(self, eye: str, message: Image | CompressedImage) -> None:
         try:
             is_jpeg = isinstance(message, CompressedImage)
             picture = compressed_to_array(message) if is_jpeg else image_to_array(message)
         except ImageError as error:
             self._say(f"{eye}: {error}")
             return
-        self._came[eye] += 1
+        self._received[eye] += 1
         self._newest[eye] = (to_seconds(message.header.stamp), picture)
         if len(self._newest) < len(self._eyes) or self.done.done():
             return
@@ -71,13 +71,13 @@ class LiveViews(Node):
         self._offered += 1
         verdict = self._collector.offer(f"view {self._offered}", pictures, self._is_steady)
         if not verdict.accepted:
-            # A live stream shows hundreds of useless pictures: only those that were taken are worth a line each.
+            # A live stream has hundreds of unusable images: only accepted views are printed.
             self._collector.verdicts.pop()
             return
         parts = [f"{eye} {self._collector.coverage(eye).fraction:.0%}" for eye in self._eyes]
         advice = {text for eye in self._eyes for text in self._collector.coverage(eye).advice()}
         self._say(
-            f"[{len(self._collector.views)}/{self._wanted}] taken; covered: {', '.join(parts)}"
+            f"[{len(self._collector.views)}/{self._wanted}] view accepted; covered: {', '.join(parts)}"
             + (f"; now {'; '.join(sorted(advice))}" if advice else "")
         )
         if len(self._collector.views) >= self._wanted:
@@ -96,21 +96,21 @@ class LiveViews(Node):
             moved.append(float(np.linalg.norm(shift, axis=1).mean()))
         return max(moved) < _STEADY_PX
 
-    def _complain(self) -> None:
-        silent = [topic for eye, topic in self._topics.items() if not self._came[eye]]
+    def _report_silence(self) -> None:
+        silent = [topic for eye, topic in self._topics.items() if not self._received[eye]]
         if silent:
-            self._say(f"nothing comes on {', '.join(silent)}: do the camera nodes run?")
-        self._came.clear()
+            self._say(f"no message on {', '.join(silent)}: check that the camera nodes run")
+        self._received.clear()
 
 
 def collect_live(collector: ViewCollector, args: argparse.Namespace, say: Callable[[str], None]) -> ViewCollector:
-    """Take views until there are enough or the user ends it; raise BoardError if there is none."""
+    """Collect views until there are enough or the user ends it; raises BoardError if there is none."""
     eyes = EYES if args.eyes == "both" else (args.eyes,)
     topics = {eye: topic for eye, topic in zip(EYES, args.topics, strict=True) if eye in eyes}
     rclpy.init(args=[])
     try:
         node = LiveViews(collector, topics, args.views, args.max_skew_s, say)
-        say("carry the board through the whole picture, near and far, tilted; hold it still for a moment each time")
+        say("move the board through the whole image, near and far, tilted; hold it still for a moment each time")
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         try:
@@ -121,5 +121,5 @@ def collect_live(collector: ViewCollector, args: argparse.Namespace, say: Callab
     finally:
         rclpy.try_shutdown()
     if not collector.views:
-        raise BoardError("no view was taken: was the board wholly visible, and held still?")
+        raise BoardError("no view was accepted: the board must be completely visible and held still")
     return collector

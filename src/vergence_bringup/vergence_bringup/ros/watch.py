@@ -1,4 +1,4 @@
-"""`vergence watch`: a live view of a running graph in the terminal, with rclpy alone (no ros2 command needed)."""
+"""`vergence watch`: a live view of a running graph in the terminal; it needs rclpy, not the ros2 command."""
 
 import argparse
 import select
@@ -22,7 +22,7 @@ from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, VergenceError
 from vergence_rig.rig import load_rig
 
-# The least messages that show whether images flow: camera_info goes with every image and costs nothing.
+# camera_info is published with every image and is cheap: it shows whether images arrive.
 _TOPICS: dict[str, tuple[Any, Any]] = {
     "left/camera_info": (CameraInfo, IMAGE_QOS),
     "right/camera_info": (CameraInfo, IMAGE_QOS),
@@ -37,36 +37,40 @@ _TOPICS: dict[str, tuple[Any, Any]] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `vergence watch`."""
-    parser.add_argument("--namespace", default="", help="the head's namespace, if it has one")
-    parser.add_argument("--rig", default="", help="rig.yaml for the joints' limits; left out: the built-in rig")
-    parser.add_argument("--rate", type=_rate, default=5.0, metavar="HZ", help="redraws a second (default %(default)s)")
-    parser.add_argument("--once", type=float, metavar="S", help="listen for S seconds, print one view and end")
+    parser.add_argument("--namespace", default="", help="namespace of the head (default: none)")
+    parser.add_argument(
+        "--rig", default="", help="path of rig.yaml, for the joints' limits (default: the built-in rig)"
+    )
+    parser.add_argument(
+        "--rate", type=_rate, default=5.0, metavar="HZ", help="redraws per second (default: %(default)s)"
+    )
+    parser.add_argument("--once", type=float, metavar="S", help="receive for S seconds, print one view and exit")
 
 
 def _rate(text: str) -> float:
     value = float(text)
     if not 0.2 <= value <= 30:
-        raise argparse.ArgumentTypeError(f"{text}: allowed is 0.2 to 30")
+        raise argparse.ArgumentTypeError(f"must be 0.2 to 30: got {text}")
     return value
 
 
-class Listener(Node):
-    """Keeps the newest message of every topic, when it came, and how often they come."""
+class GraphMonitor(Node):
+    """Keeps the newest message of every topic, its arrival and its rate."""
 
     def __init__(self, namespace: str) -> None:
         super().__init__("vergence_watch", namespace=namespace or None)
         self.streams = {topic: Stream() for topic in _TOPICS}
         self.health: dict[str, tuple[int, str, float]] = {}
         for topic, (kind, qos) in _TOPICS.items():
-            self.create_subscription(kind, topic, self._into(self.streams[topic]), qos)
+            self.create_subscription(kind, topic, self._add_to(self.streams[topic]), qos)
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
 
     def snapshot(self) -> Snapshot:
-        """Return what is known now."""
+        """Return the state now."""
         return Snapshot(time.monotonic(), time.time(), self.streams, self.health)
 
-    def _into(self, stream: Stream) -> Any:
-        return lambda message: stream.take(message, time.monotonic())
+    def _add_to(self, stream: Stream) -> Any:
+        return lambda message: stream.add(message, time.monotonic())
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -74,10 +78,10 @@ class Listener(Node):
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show the graph until q or Ctrl-C; with --once return 1 if nothing was heard."""
+    """Show the graph until q or Ctrl-C; with --once return 1 if no message arrived."""
     screen = Screen(_limits(options.rig))
     rclpy.init()
-    node = Listener(options.namespace)
+    node = GraphMonitor(options.namespace)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
@@ -109,8 +113,8 @@ def _spin_for(executor: SingleThreadedExecutor, duration_s: float) -> None:
         executor.spin_once(timeout_sec=left_s)
 
 
-def _live(screen: Screen, node: Listener, executor: SingleThreadedExecutor, period_s: float) -> None:
-    with _keys_without_enter(), _own_page():
+def _live(screen: Screen, node: GraphMonitor, executor: SingleThreadedExecutor, period_s: float) -> None:
+    with _keys_without_enter(), _alternate_screen():
         while True:
             _spin_for(executor, period_s)
             lines = screen.lines(node.snapshot(), _width(), colour=True)
@@ -122,8 +126,8 @@ def _live(screen: Screen, node: Listener, executor: SingleThreadedExecutor, peri
 
 
 @contextmanager
-def _own_page() -> Iterator[None]:
-    """Draw on the terminal's second page, without a cursor; give the first one back as it was."""
+def _alternate_screen() -> Iterator[None]:
+    """Draw on the terminal's alternate screen, without a cursor; restore the normal one afterwards."""
     sys.stdout.write("\033[?1049h\033[?25l\033[2J")
     try:
         yield

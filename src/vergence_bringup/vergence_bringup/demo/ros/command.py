@@ -1,4 +1,4 @@
-"""`vergence demo`: every node as its own process, the simulated head, and a report of what it did."""
+"""`vergence demo`: the whole graph on the simulated head, every node as a process, and a report."""
 
 import argparse
 import contextlib
@@ -24,31 +24,31 @@ from vergence_rig.rig import Rig, load_rig
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the subcommand."""
-    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="where the report goes (default: out/demo)")
+    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder of the report (default: out/demo)")
     parser.add_argument("--short", action="store_true", help="three stations instead of eight")
     parser.add_argument("--ideal", action="store_true", help="ideal servos and cameras instead of realistic ones")
     parser.add_argument("--station", action="append", metavar="NAME", help="only this station (may be repeated)")
-    parser.add_argument("--seed", type=int, default=0, help="of the simulator's noise and world (default: 0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the simulator's noise (default: 0)")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the demo; 0 only if at every station the graph said verged and the simulator's truth agrees."""
+    """Run the demo; 0 only if every station was reported verged and the ground truth agrees."""
     rig = load_rig(config_dir() / "rig.yaml")
     chosen = stations(rig.baseline_m, options.short)
     if options.station:
         known = {station.name: station for station in stations(rig.baseline_m)}
         for name in options.station:
             if name not in known:
-                raise ValueError(f"--station is {name!r}: allowed is one of {', '.join(known)}")
+                raise ValueError(f"--station must be one of {', '.join(known)}: got {name!r}")
         chosen = [known[name] for name in options.station]
 
     signal.signal(signal.SIGTERM, _interrupt)
     os.environ.update(environment())
     with contextlib.ExitStack() as stack:
         if "ROS_DOMAIN_ID" not in os.environ:
-            # Another head on this machine must not be heard here, nor hear this one.
+            # Separate from every other head on this machine.
             os.environ["ROS_DOMAIN_ID"] = str(stack.enter_context(own_domain()))
-            _say(f"to look on from another shell: source env.sh; export ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
+            _say(f"to watch from another shell: source env.sh; export ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
         return _run(options, rig, chosen)
 
 
@@ -78,20 +78,20 @@ def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station]) -> int:
     print()
     print(table(results))
     passed = sum(result.passed for result in results)
-    print(f"\n{passed} of {len(results)} stations verged, by the graph's word and by the simulator's truth")
+    print(f"\n{passed} of {len(results)} stations verged, as reported by the graph and confirmed by the ground truth")
     print(f"report: {options.out / 'report.html'}   figures: {options.out / 'summary.json'}")
     return 0 if results and passed == len(results) and not any(statuses.values()) else 1
 
 
 @contextlib.contextmanager
-def _runner(options: argparse.Namespace, rig: Rig, alive: Callable[[], None]) -> Iterator[Runner]:
+def _runner(options: argparse.Namespace, rig: Rig, check_alive: Callable[[], None]) -> Iterator[Runner]:
     # Imported late: rclpy reads the middleware's environment when it is loaded.
     from vergence_bringup.demo.ros.recorder import Recorder
-    from vergence_bringup.demo.ros.run import StationRunner, tolerance_deg
+    from vergence_bringup.demo.ros.station_runner import StationRunner, tolerance_deg
 
     recorder = Recorder()
     try:
-        yield StationRunner(recorder, alive, rig, tolerance_deg(rig, options.ideal), options.out)
+        yield StationRunner(recorder, check_alive, rig, tolerance_deg(rig, options.ideal), options.out)
     finally:
         recorder.close()
 
@@ -103,7 +103,7 @@ def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
 
 
 def _ideal_rig(out_dir: Path) -> Path:
-    """Write the shipped rig with ideal servos, so that the controller does not reckon with play that is not there."""
+    """Write the shipped rig with ideal servos, so that the controller assumes no play."""
     rig = yaml.safe_load((config_dir() / "rig.yaml").read_text(encoding="utf-8"))
     for joint in rig["joints"].values():
         joint["servo"] = "ideal"

@@ -1,4 +1,4 @@
-"""The stage on which a running, simulated head looks at things: puts them somewhere and sends the eyes to a start."""
+"""Places the objects of a running simulated head and moves the eyes to their start."""
 
 from collections.abc import Callable, Sequence
 
@@ -14,24 +14,26 @@ _SETTLE_S = 0.7
 
 
 class Stage:
-    """The simulator's movable `things`: target, distractor, occluder; `alive` raises when a node has died."""
+    """The simulator's movable `objects`: target, distractor, occluder; `check_alive` raises when a node has ended."""
 
-    def __init__(self, recorder: Recorder, alive: Callable[[], None], things: Sequence[str]) -> None:
-        self._recorder, self._alive = recorder, alive
-        self._places = {what: recorder.node.create_publisher(PointStamped, f"sim/{what}_pose", 10) for what in things}
+    def __init__(self, recorder: Recorder, check_alive: Callable[[], None], objects: Sequence[str]) -> None:
+        self._recorder, self._check_alive = recorder, check_alive
+        self._places = {what: recorder.node.create_publisher(PointStamped, f"sim/{what}_pose", 10) for what in objects}
 
     def wait_until_ready(self) -> None:
-        """Wait until every node has been heard; raises GraphError."""
+        """Wait until every node publishes; raises GraphError."""
         recorder = self._recorder
-        recorder.wait_for("ground truth from sim_node", lambda: recorder.truths, 40.0, self._alive)
-        recorder.wait_for("vergence/edge from edge_metric_node", lambda: recorder.edges, 40.0, self._alive)
-        recorder.wait_for("gaze/state from gaze_controller_node", lambda: recorder.states, 40.0, self._alive)
-        recorder.wait_for("vergence/box from box_metric_node", lambda: recorder.boxes, 40.0, self._alive)
+        recorder.wait_for("ground truth from sim_node", lambda: recorder.truths, 40.0, self._check_alive)
+        recorder.wait_for("vergence/edge from edge_metric_node", lambda: recorder.edges, 40.0, self._check_alive)
+        recorder.wait_for("gaze/state from gaze_controller_node", lambda: recorder.states, 40.0, self._check_alive)
+        recorder.wait_for("vergence/box from box_metric_node", lambda: recorder.boxes, 40.0, self._check_alive)
         for what, publisher in self._places.items():
-            recorder.wait_for(f"sim_node to take sim/{what}_pose", publisher.get_subscription_count, 20.0, self._alive)
+            recorder.wait_for(
+                f"sim_node to subscribe to sim/{what}_pose", publisher.get_subscription_count, 20.0, self._check_alive
+            )
 
     def put(self, what: str, place_m: Sequence[float] | npt.NDArray[np.float64]) -> None:
-        """Put a thing's centre somewhere in rig_base (3,) [m]."""
+        """Place an object's centre in rig_base (3,) [m]."""
         message = PointStamped()
         message.header.stamp = self._recorder.node.get_clock().now().to_msg()
         message.header.frame_id = "rig_base"
@@ -39,7 +41,7 @@ class Stage:
         self._places[what].publish(message)
 
     def hide(self, what: str) -> None:
-        """Put a thing where no eye sees it."""
+        """Place an object out of sight."""
         self.put(what, _OUT_OF_SIGHT_M)
 
     def clear(self) -> None:
@@ -48,17 +50,17 @@ class Stage:
             self.hide(what)
 
     def send_eyes(self, version_rad: float, vergence_rad: float, tilt_rad: float) -> None:
-        """Send the eyes to these angles and let them settle there."""
+        """Move the eyes to these angles and let them settle."""
         goal = LookAt.Goal(kind=LookAt.Goal.ANGLES, time_limit_s=5.0)
         goal.version_rad, goal.vergence_rad, goal.tilt_rad = version_rad, vergence_rad, tilt_rad
-        self._recorder.look_at(goal, self._alive)
+        self._recorder.look_at(goal, self._check_alive)
         self.settle()
 
     def settle(self) -> None:
-        """Let the graph run for a moment."""
-        self._recorder.settle(_SETTLE_S, self._alive)
+        """Let the graph run for 0.7 s."""
+        self._recorder.settle(_SETTLE_S, self._check_alive)
 
 
-def of_class(name: str, time_limit_s: float) -> LookAt.Goal:
-    """Return the goal of one who knows what to look at and not where it is: the detector's class."""
+def class_goal(name: str, time_limit_s: float) -> LookAt.Goal:
+    """Return the goal of looking at a detected class, wherever it is."""
     return LookAt.Goal(kind=LookAt.Goal.CLASS, class_name=name, time_limit_s=time_limit_s)

@@ -1,11 +1,11 @@
-"""The detector that ships and the demo's station for it: rendered without ROS, the cube is found and nothing else."""
+"""The shipped detector on the demo's station for it, rendered without ROS: it finds the cube and nothing else."""
 
 import math
 
 import numpy as np
 import pytest
 
-from vergence_bringup.demo.stations import cube_told_apart
+from vergence_bringup.demo.stations import cube_with_distractor
 from vergence_metric.boxes import BoxStatus, measure_pair
 from vergence_sim.parameters import SimParameters
 from vergence_sim.renderer import RenderError
@@ -18,7 +18,7 @@ def simulator():
         simulator = Simulator(SimParameters())
     except RenderError as error:
         pytest.skip(f"no OpenGL here: {error}")
-    station = cube_told_apart()
+    station = cube_with_distractor()
     assert station.place_m is not None
     assert station.distractor_m is not None
     simulator.place_target(station.target, station.place_m)
@@ -28,7 +28,7 @@ def simulator():
 
 
 @pytest.mark.parametrize("pans_deg", [(-0.5, 0.5), (5.2, 10.8)], ids=["at the start", "at vergence"])
-def test_the_cube_is_told_from_the_nearer_look_alike(simulator, pans_deg):
+def test_the_cube_is_found_and_the_nearer_look_alike_is_not(simulator, pans_deg):
     left_deg, right_deg = pans_deg
     simulator.set_head({"pan_left": math.radians(left_deg), "pan_right": math.radians(right_deg), "tilt": 0.0})
     frame = simulator.capture(0.0)

@@ -1,4 +1,4 @@
-"""One station of the demo: place the target, click on it, watch the eyes, compare with the truth."""
+"""One station of the demo: place the target, click on it, record the eyes, compare with the ground truth."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -9,12 +9,11 @@ import numpy as np
 
 from vergence_bringup.demo.result import Floats, MetricTable, Series, StationResult
 from vergence_bringup.demo.ros.recorder import Recorder, Stamped, StereoPicture
-from vergence_bringup.demo.ros.stage import Stage, of_class
+from vergence_bringup.demo.ros.stage import Stage, class_goal
 from vergence_bringup.demo.stations import Station
 from vergence_bringup.figures.boxes import BoxFigures
 from vergence_bringup.figures.pictures import Image, combined_edges, with_box, with_cross, with_windows, write_image
 from vergence_common.stamps import to_seconds
-from vergence_metric.edges.parameters import EdgeMetricParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import EdgeVergence
@@ -23,81 +22,81 @@ from vergence_rig.rig import Rig
 # The target point must end inside the 50 px fovea of both eyes.
 _FOVEA_HALF_PX = 25.0
 _LIMIT_S = 12.0
-_GO_ALONG_S = 1.0
+_ACQUIRE_S = 1.0
 
 
 def tolerance_deg(rig: Rig, ideal: bool) -> float:
-    """Return what the true vergence error may be: the servos' dead band, 0.1 degree where they have none."""
+    """Return the largest accepted true vergence error: the servos' dead band, 0.1 degree for ideal servos."""
     return 0.1 if ideal else math.degrees(rig.pan_left.servo.dead_band_rad)
 
 
 class StationRunner:
-    """Visits stations one after the other; `alive` raises when a node has died."""
+    """Visits stations one after the other; `check_alive` raises when a node has ended."""
 
     def __init__(
-        self, recorder: Recorder, alive: Callable[[], None], rig: Rig, tolerance_deg: float, out_dir: Path
+        self, recorder: Recorder, check_alive: Callable[[], None], rig: Rig, tolerance_deg: float, out_dir: Path
     ) -> None:
         self._recorder = recorder
-        self._alive = alive
+        self._check_alive = check_alive
         self._rig = rig
         self._tolerance_deg = tolerance_deg
         self._out_dir = out_dir
-        self._edge_metric = EdgeMetric(EdgeMetricParameters())
-        self._stage = Stage(recorder, alive, ("target", "distractor"))
+        self._edge_metric = EdgeMetric()
+        self._stage = Stage(recorder, check_alive, ("target", "distractor"))
 
     def wait_until_ready(self) -> None:
-        """Wait until every node has been heard."""
+        """Wait until every node publishes."""
         self._stage.wait_until_ready()
 
     def visit(self, station: Station) -> StationResult:
-        """Show the target, ask the graph to look at it, and return what happened.
+        """Show the target, send a goal to look at it, and return the result.
 
-        The goal is a click on the left image, as a person would give it, or the target's class.
+        The goal is a click on the left image or the target's class.
         """
         recorder = self._recorder
         self._stage.clear()  # until the eyes are at the start
-        recorder.set_parameters("gaze_controller_node", {"mode": "both_eyes"}, self._alive)
+        recorder.set_parameters("gaze_controller_node", {"mode": "both_eyes"}, self._check_alive)
         self._stage.send_eyes(
             math.radians(station.start_version_deg),
             math.radians(station.start_vergence_deg),
             math.radians(station.start_tilt_deg),
         )
-        recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._alive)
-        recorder.set_parameters("sim_node", {"target.object": station.target}, self._alive)
+        recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._check_alive)
+        recorder.set_parameters("sim_node", {"target.object": station.target}, self._check_alive)
         if station.distractor_m:
             self._stage.put("distractor", station.distractor_m)
         self._stage.put("target", station.place_m or self._fixation_m())
         shown_at = recorder.now_s()
         truth = recorder.wait_for(
-            f"{station.target} in both views", lambda: self._seen(station, shown_at), 10.0, self._alive
+            f"{station.target} in both views", lambda: self._seen(station, shown_at), 10.0, self._check_alive
         )
-        before = recorder.picture(station.has_boxes, self._alive)
+        before = recorder.picture(station.has_boxes, self._check_alive)
         self._store(station, "start", before)
 
         began = recorder.now_s()
         marks = len(recorder.states), len(recorder.edges), len(recorder.truths), len(recorder.boxes)
-        goal = of_class(station.target, _LIMIT_S) if station.by_class else _click(truth)
-        result = recorder.look_at(goal, self._alive, _LIMIT_S + 10.0)
+        goal = class_goal(station.target, _LIMIT_S) if station.by_class else _click(truth)
+        result = recorder.look_at(goal, self._check_alive, _LIMIT_S + 10.0)
         reason = "" if result.result == LookAt.Result.VERGED else result.reason
         if station.moving:
-            recorder.set_parameters("sim_node", dict(station.motion), self._alive)
-            # It starts at full speed: the eyes get a second to go along before they have to stay on it.
-            recorder.settle(_GO_ALONG_S, self._alive)
-        recorder.settle(station.hold_s, self._alive)
-        after = recorder.picture(station.has_boxes, self._alive)
+            recorder.set_parameters("sim_node", dict(station.motion), self._check_alive)
+            # The target starts at full speed: the eyes get a second to reach it before the hold begins.
+            recorder.settle(_ACQUIRE_S, self._check_alive)
+        recorder.settle(station.hold_s, self._check_alive)
+        after = recorder.picture(station.has_boxes, self._check_alive)
         self._store(station, "end", after)
         if station.moving:
-            recorder.set_parameters("sim_node", {"motion.kind": "static"}, self._alive)
+            recorder.set_parameters("sim_node", {"motion.kind": "static"}, self._check_alive)
         return self._result(station, began, marks, reason, before, after)
 
     def _fixation_m(self) -> Sequence[float]:
-        """Return where the graph itself says that the axes meet, now that the eyes are still."""
+        """Return the fixation point (3,) [m] that the controller reports while the eyes rest."""
         now = self._recorder.now_s()
         entry = self._recorder.wait_for(
             "gaze/fixation_point from gaze_controller_node",
             lambda: next((entry for entry in self._recorder.fixations[-1:] if entry.arrival_s >= now), None),
             5.0,
-            self._alive,
+            self._check_alive,
         )
         point = entry.message.point
         return point.x, point.y, point.z
@@ -140,16 +139,16 @@ class StationRunner:
         )
         held_from_s = recorder.now_s() - station.hold_s
         held = [entry.message.verged for entry in states if entry.arrival_s >= held_from_s]
-        # Single cycles without the word are allowed, in following a moving target or on a busy machine; not the end.
+        # Single cycles without vergence are tolerated, in pursuit or on a busy machine, but not at the end.
         lately = [entry.message.verged for entry in states if entry.arrival_s >= recorder.now_s() - 0.5]
-        said = bool(held) and np.mean(held) >= 0.8 and np.mean(lately) >= 0.5 and not reason
-        if not said and not reason:
+        reported = bool(held) and np.mean(held) >= 0.8 and np.mean(lately) >= 0.5 and not reason
+        if not reported and not reason:
             reason = (
-                f"verged in {100 * np.mean(held):.0f} % of the hold: {states[-1].message.reason}"
+                f"vergence was reported in {100 * np.mean(held):.0f} % of the hold: {states[-1].message.reason}"
                 if held
-                else "no state"
+                else "gaze/state was not received"
             )
-        said_at = next((entry.arrival_s for entry in states if entry.message.verged), math.nan)
+        reported_at_s = next((entry.arrival_s for entry in states if entry.message.verged), math.nan)
         end_truths = [entry.message for entry in truths if entry.arrival_s >= held_from_s]
         final = truths[-1].message
         fixation = states[-1].message.target
@@ -157,9 +156,9 @@ class StationRunner:
             name=station.name,
             title=station.title,
             moving=station.moving,
-            said_verged=bool(said),
+            reported_verged=bool(reported),
             reason=reason,
-            time_s=said_at - began_s,
+            time_s=reported_at_s - began_s,
             true_error_deg=_median_deg([truth.vergence_error_rad for truth in end_truths]),
             off_axis_deg=max(
                 _median_deg([truth.left_error_rad for truth in end_truths]),
@@ -178,7 +177,7 @@ class StationRunner:
 
 
 def _click(truth: Any) -> LookAt.Goal:
-    """Return the goal of a person who clicks on the target in the left image: one pixel, no depth."""
+    """Return the goal of a click on the target in the left image: one pixel, no depth."""
     goal = LookAt.Goal(kind=LookAt.Goal.PIXEL, eye=LookAt.Goal.EYE_LEFT, time_limit_s=_LIMIT_S, depth_m=math.nan)
     goal.header.stamp = truth.header.stamp
     goal.left_x_px, goal.left_y_px = float(round(truth.left_x_px)), float(round(truth.left_y_px))
