@@ -1,4 +1,4 @@
-"""Which cells answer for which object: task-aligned assignment (Feng et al., "TOOD", 2021)."""
+"""Which cells predict which object: task-aligned assignment (Feng et al., "TOOD", 2021)."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ _TINY = 1e-9
 
 @dataclass(frozen=True)
 class Assignment:
-    """For every cell: its target scores (B, N, C), the box it answers for (B, N, 4), and whether it does (B, N)."""
+    """For every cell: its target scores (B, N, C), the box it predicts (B, N, 4), and whether it does (B, N)."""
 
     scores: Tensor
     boxes: Tensor
@@ -43,7 +43,7 @@ def _assigned(
     count = scores.shape[1]
     overlap = pairwise_iou(truth, boxes).clamp(min=0)  # (B, M, N)
     of_class = scores.gather(2, classes[:, None, :].expand(-1, count, -1)).transpose(1, 2)  # (B, M, N)
-    # Small boxes are widened, so that at least the cells around them may answer.
+    # Small boxes are widened, so that at least the cells around them are candidates.
     size = truth[..., 2:] - truth[..., :2]
     widen = ((2 * _REACH_PX - size) / 2).clamp(min=0)
     low, high = truth[..., :2] - widen, truth[..., 2:] + widen
@@ -51,18 +51,18 @@ def _assigned(
     quality = of_class.pow(_SCORE_POWER) * overlap.pow(_OVERLAP_POWER) * near * valid[..., None]
     top = quality.topk(min(_TOP, count), dim=2)
     chosen = torch.zeros_like(quality, dtype=torch.bool).scatter_(2, top.indices, top.values > _TINY)
-    # Early on no box overlaps: then the nearest cell answers, so that there is something to learn from.
+    # Early on no box overlaps: then the nearest cell is chosen, so that every object has a gradient.
     distance = (centers[None, None] - 0.5 * (truth[..., :2] + truth[..., 2:])[:, :, None]).square().sum(-1)
     nearest = torch.zeros_like(chosen).scatter_(2, distance.argmin(2, keepdim=True), True)
     chosen |= nearest & valid[..., None] & ~chosen.any(2, keepdim=True)
-    # A cell wanted by several goes to the one it overlaps most.
+    # A cell chosen for several objects goes to the one it overlaps most.
     rank = torch.where(chosen, overlap + 1e-6, torch.zeros_like(overlap))
     best = rank.argmax(1)  # (B, N)
     positive = chosen.any(1)
     taken = torch.zeros_like(chosen).scatter_(1, best[:, None], positive[:, None])
     quality, overlap = quality * taken, overlap * taken
-    # The best cell of an object is asked for the root of its overlap: the overlap itself would leave small objects,
-    # whose boxes overlap less, with scores that clutter reaches.
+    # The best cell of an object gets the root of its overlap as target score: the overlap itself would leave small
+    # objects, whose boxes overlap less, with scores that clutter reaches.
     scale = overlap.amax(2, keepdim=True).sqrt() / quality.amax(2, keepdim=True).clamp(min=_TINY)
     score = (quality * scale).amax(1)
     score = torch.where(positive, score.clamp(min=0.05), torch.zeros_like(score))

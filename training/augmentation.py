@@ -12,7 +12,7 @@ Image = NDArray[np.uint8]
 Boxes = NDArray[np.float32]
 _SHIPPED_SCALE = 0.5
 _LEAST_SEEN, _LEAST_PX = 0.35, 5.0
-_ANYWHERE, _ANYWHERE_PX = 0.06, (12.0, 150.0)  # share of the second looks at nothing, and their boxes' sides
+_ANYWHERE, _ANYWHERE_PX = 0.06, (12.0, 150.0)  # share of the second looks at background, and their boxes' sides
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def part_of(
     return _varied(rng, picture, inside, _share(inside / factor, boxes), strength)
 
 
-def closer_look(
+def second_look_crop(
     rng: np.random.Generator,
     image: Image,
     boxes: Boxes,
@@ -63,9 +63,9 @@ def closer_look(
     size_px: tuple[int, int],
     strength: Strength,
 ) -> tuple[Image, Boxes]:
-    """Return a varied second look at an object, look-alike or anything, as the node cuts it; see `part_of`.
+    """Return a varied second look at an object, look-alike or background, cropped as the detector does; see `part_of`.
 
-    The window stands about a box as wrong as a first look's may be.
+    The window lies about a box with the errors of a first look.
     """
     choice = rng.random()
     if choice < _ANYWHERE or not len(boxes) + len(alikes):
@@ -73,7 +73,7 @@ def closer_look(
         middle, half = rng.uniform((0, 0), image.shape[1::-1]), 0.5 * np.exp(rng.uniform(low, high, 2))
         box = np.concatenate([middle - half, middle + half])
     else:
-        # As many look-alikes as objects: what a closer look is asked of is mostly one of the two.
+        # As many look-alikes as objects: second looks are mostly at one of the two.
         among = boxes if not len(alikes) or (len(boxes) and choice < 0.5 * (1 + _ANYWHERE)) else alikes
         box = among[rng.integers(len(among))].astype(np.float64)
     size = box[2:] - box[:2]

@@ -1,4 +1,4 @@
-"""How good a detector is: average precision by class and size, and scores at a threshold. No torch in it."""
+"""How good a detector is: average precision by class and size, and scores at a threshold. Needs no torch."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ OVERLAPS = tuple(round(0.5 + 0.05 * i, 2) for i in range(10))
 class ImageResult:
     """One class in one image: found boxes (K, 4) with scores (K,), true ones (M, 4), and which of those to ignore.
 
-    An ignored truth (another size, hardly visible) is neither to be found nor wrong to be found.
+    An ignored truth (another size, hardly visible) counts neither as missed nor as a false detection.
     """
 
     found: Boxes

@@ -1,4 +1,4 @@
-"""The figures in the model card, written by whoever measured them."""
+"""Writes the measured figures into the model card."""
 
 import re
 from pathlib import Path

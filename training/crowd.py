@@ -1,4 +1,4 @@
-"""The simulator's room with more movable things in it: cubes, look-alikes, an occluder."""
+"""The simulator's room with more movable objects: cubes, look-alikes, an occluder."""
 
 import numpy as np
 
@@ -12,10 +12,10 @@ LOOK_ALIKES = 8
 
 
 class CrowdBuilder(SceneBuilder):
-    """The simulator's room with more movable things in it."""
+    """The simulator's room with more movable objects."""
 
     def populate(self, puzzle_share: float) -> None:
-        """Several cubes, each scrambled its own way, look-alikes of all kinds, and an occluder."""
+        """Add several cubes, each scrambled its own way, look-alikes of all kinds, and an occluder."""
         rng = self._rng
         half = CUBE_SIDE_M / 2
         self.smallest_px: list[float] = []  # of each look-alike, see SMALLEST_PX

@@ -22,7 +22,7 @@ _MOST_ALIKES = 8
 class Shard:
     """Renders: `images`, n of (480, 640, 3) BGR, `boxes` (n, 4, 4) xyxy counted from the image's corner [px].
 
-    `count` (n,) says how many boxes there are, `visible` (n, 4) what share of each is seen, `cut` (n, 4) which the
+    `count` (n,) is the number of boxes, `visible` (n, 4) what share of each is seen, `cut` (n, 4) which the
     border cuts, `alikes` (n, 8, 4) about where look-alikes are, NaN for none.
     """
 
@@ -41,7 +41,7 @@ def shard_path(folder: Path, seed: int) -> Path:
 
 @dataclass(frozen=True)
 class Content:
-    """What renders hold: the share with a cube, of these the share with each further one, of puzzles in look-alikes."""
+    """Shares of renders with a cube, of these with each further one, and of puzzles among the look-alikes."""
 
     targets: float
     more: float
@@ -49,7 +49,7 @@ class Content:
 
 
 TRAINING = Content(0.75, 0.5, 0.4)
-"""Dense, for what a render costs, and rich in what is hard."""
+"""Many cubes and hard cases per render, because renders are expensive."""
 
 HELD_OUT = Content(0.5, 0.15, 0.2)
 

@@ -23,7 +23,7 @@ class Deployed(nn.Module):
     """What is exported: one output (B, N, 5 + classes), centre and size in input pixels, objectness 1, scores 0..1."""
 
     def __init__(self, detector: Detector) -> None:
-        """Take a copy of a trained network."""
+        """Copy and fuse a trained network."""
         super().__init__()
         self.detector = fuse(deepcopy(detector).eval())
         self.heads = nn.ModuleList([DeployedHead(head) for head in self.detector.heads])
@@ -38,7 +38,7 @@ class DeployedHead(nn.Module):
     """One stride's rows, (B, 5 + classes, h * w)."""
 
     def __init__(self, head: Head) -> None:
-        """Take a fused head."""
+        """Convert a fused head."""
         super().__init__()
         self.score_unit, self.box_unit = head.score_unit, head.box_unit
         matrix = _BOX_OF_DISTANCES * float(head.stride)
@@ -66,7 +66,7 @@ class DeployedBlock(nn.Module):
     """A PartialBlock whose halves come from convolutions of their own."""
 
     def __init__(self, block: PartialBlock) -> None:
-        """Take a fused block."""
+        """Convert a fused block."""
         super().__init__()
         assert isinstance(block.enter, nn.Sequential)
         enter = block.enter[0]

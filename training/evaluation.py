@@ -1,4 +1,4 @@
-"""How good an exported detector is on renders of worlds it was not trained on, through the code that runs it."""
+"""How good an exported detector is on renders of worlds it was not trained on, through the code of the node."""
 
 import json
 from dataclasses import asdict, dataclass

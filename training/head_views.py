@@ -1,7 +1,7 @@
-"""The target as the head meets it: the simulator's own pictures of an upright cube at arm's length, both eyes.
+"""The target as the head sees it: the simulator's own pictures of an upright cube at arm's length, both eyes.
 
 `Stage` shows cubes turned any way; here few faces are seen, the side ones narrow and dark, which is where the sides of
-boxes are hardest to tell.
+boxes are hardest to locate.
 """
 
 import math
@@ -22,7 +22,7 @@ _UPRIGHT_SHARE = 0.5  # stands as the simulator puts it; the others are turned a
 
 
 def head_views(seed: int, count: int) -> Iterator[View]:
-    """Give `count` renders of one world, the same for the same seed: pairs of eyes, one after the other."""
+    """Yield `count` renders of one world, the same for the same seed: pairs of eyes, one after the other."""
     rng = np.random.default_rng([seed, 11])
     simulator = Simulator(_parameters(rng, seed), default_rig())
     try:
@@ -44,14 +44,14 @@ def _parameters(rng: np.random.Generator, seed: int) -> SimParameters:
             "servo": "ideal",
             "camera.distortion": (0.0,) * 5 if rng.random() < 0.5 else SimParameters().camera.distortion,
             "world.light": float(np.exp(rng.uniform(math.log(0.4), math.log(1.4)))),
-            "camera.samples_per_pixel": int(rng.choice([0, 0, 0, 4])),
+            "world.samples_per_pixel": int(rng.choice([0, 0, 0, 4])),
             "world.look_alikes": int(rng.integers(0, 5)),
         }
     )
 
 
 def _pair(simulator: Simulator, rng: np.random.Generator) -> list[View]:
-    """Return what the eyes see of one place of the target; none of an eye that sees too little of it to name it."""
+    """Return what the eyes see of one place of the target; none of an eye that sees too small a part of it."""
     turned = rng.random() >= _UPRIGHT_SHARE
     simulator.set_parameters(
         simulator.parameters.replaced(

@@ -1,4 +1,4 @@
-"""The true box of a box-shaped thing: its outline by projection, what is seen of it by segmentation."""
+"""The true box of a box-shaped object: its outline by projection, its visible part by segmentation."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ class Label:
 
 
 def label(local_m: NDArray[np.float64], seen: NDArray[np.bool_], focal_px: float) -> Label | None:
-    """Return the label of a thing, None out of view.
+    """Return the label of an object, None out of view.
 
     The box is that of the geometric outline where nothing hides any of it, else of the pixels that are seen.
 

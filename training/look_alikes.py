@@ -1,4 +1,4 @@
-"""Things that are no Rubik's cube but share its colours, shape or pattern: what a detector has to leave alone."""
+"""Objects with the colours, shape or pattern of a Rubik's cube, which a detector must not detect."""
 
 from collections.abc import Callable
 
@@ -42,7 +42,7 @@ def _dots(rng: np.random.Generator) -> Image:
 
 
 def _checks(rng: np.random.Generator) -> Image:
-    """A chessboard of two tones, never nine fields."""
+    """A chessboard of two tones, never 3x3 fields."""
     fields = int(rng.choice([2, 4, 6, 8]))
     light, dark = _colour(rng), tuple(int(v) for v in rng.integers(0, 70, 3))
     cells = np.indices((fields, fields)).sum(0) % 2
@@ -102,7 +102,7 @@ SMALLEST_PX = {
     "puzzle of 4": 26.0,
     "puzzle of 5": 30.0,
 }
-"""Width at 320 from which one can tell each from a Rubik's cube: what cannot be seen is not asked for [px]."""
+"""Width [px at 320] from which each is distinguishable from a Rubik's cube; smaller ones are not placed."""
 
 
 def faces(rng: np.random.Generator, kind: str) -> list[Image]:

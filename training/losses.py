@@ -1,4 +1,4 @@
-"""What is minimised: varifocal loss of the scores, GIoU and scaled L1 of the boxes."""
+"""The training loss: varifocal loss of the scores, GIoU and scaled L1 of the boxes."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ def detection_loss(logits: Tensor, boxes: Tensor, wanted: Assignment) -> Loss:
     found, truth = boxes[wanted.positive], wanted.boxes[wanted.positive]
     importance = wanted.scores.sum(-1)[wanted.positive]
     apart = 1.0 - generalised_iou(found, truth)
-    # Sides off by a pixel matter alike for all sizes above the smallest: corners are what the metric subtracts.
+    # Sides off by a pixel count the same for all sizes above the smallest: corners are what the metric subtracts.
     side = (truth[:, 2:] - truth[:, :2]).amax(1).clamp(min=8.0)
     off = functional.smooth_l1_loss(found, truth, reduction="none", beta=_L1_SOFT_PX).mean(1) / side.sqrt()
     box = ((_GIOU_WEIGHT * apart + _L1_WEIGHT * off) * importance).sum() / weight

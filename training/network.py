@@ -104,13 +104,13 @@ class Head(nn.Module):
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
         """(B, inputs, h, w) to logits (B, classes, h, w) and left, top, right, bottom distances (B, 4, h, w) [px]."""
-        # Straight, so that a cell may also answer for a small box beside its centre: a distance is negative then.
+        # Straight, so that a cell may also predict a small box beside its centre: a distance is negative then.
         distances = self.box(self.box_unit(x)) * float(self.stride)
         return self.score(self.score_unit(x)), distances
 
 
 class Detector(nn.Module):
-    """The whole network; `forward` gives raw answers for training, `Deployed` wraps it for export."""
+    """The whole network; `forward` returns raw outputs for training, `Deployed` wraps it for export."""
 
     def __init__(self, classes: int, widths: Widths | None = None) -> None:
         super().__init__()
@@ -147,7 +147,7 @@ class Detector(nn.Module):
         return torch.cat(scores, dim=1), torch.cat(boxes, dim=1)
 
     def features(self, images: Tensor) -> tuple[Tensor, Tensor]:
-        """Return what the heads of strides 8 and 16 see of images (B, 3, h, w)."""
+        """Return the input features of the heads of strides 8 and 16 for images (B, 3, h, w)."""
         eight = self.eight(self.four(self.stem(images)))
         sixteen = self.sixteen(eight)
         deep = self.lower(self.thirtytwo(sixteen))

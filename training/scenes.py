@@ -30,7 +30,7 @@ class View:
 
     `boxes_px` (M, 4) xyxy with the origin at the centre of the top-left pixel: the geometric outline where nothing
     hides any of it, else the box of what is seen. `visible` (M,) is the share of each outline that is seen, what lies
-    beyond the border counted as unseen. `cut` (M,) tells which ones the border cuts. `alike_px` (K, 4) are
+    beyond the border counted as unseen. `cut` (M,) is True for those that the border cuts. `alike_px` (K, 4) are
     boxes about the look-alikes in view, to a third of their size.
     """
 
@@ -51,7 +51,7 @@ class StereoView:
 
 
 class Stage:
-    """One world, from its seed; `view` gives renders from random places, the same for the same seed."""
+    """One world, from its seed; `views` yields renders from random places, the same for the same seed."""
 
     def __init__(self, seed: int, samples: int | None = None, puzzle_share: float = 0.2) -> None:
         """Build it; `puzzle_share` of the look-alikes are puzzles of another number of cells."""
@@ -80,7 +80,7 @@ class Stage:
         self._renderer.close()
 
     def views(self, count: int, target_share: float = 0.75, more_share: float = 0.15) -> Iterator[View]:
-        """Give `count` views; in about `target_share` a cube was placed, each further one in `more_share` of those."""
+        """Yield `count` views; in about `target_share` a cube was placed, each further one in `more_share` of those."""
         given = 0
         while given < count:
             view = self._view(self._rng.random() < target_share, more_share)
@@ -89,7 +89,7 @@ class Stage:
                 yield view
 
     def stereo_views(self, count: int, cubes: int) -> Iterator[StereoView]:
-        """Give `count` pairs with `cubes` alike cubes each, some beside each other, none hidden or cut in both eyes."""
+        """Yield `count` pairs with `cubes` cubes each, some beside each other, none hidden or cut in both eyes."""
         given = 0
         while given < count:
             view = self._stereo_view(cubes)
@@ -186,14 +186,14 @@ class Stage:
     def _place_alike(self, number: int, shown: bool) -> Array | None:
         """Put a look-alike somewhere and return about its box (4,) [px].
 
-        A puzzle is put whole, since of one that is cut nobody can count the cells.
+        A puzzle is put whole, since the cells of one that is cut cannot be counted.
         """
         width_px = _width_px(self._rng, self._smallest_px[number])
         place = self._place(f"alike{number}", shown, width_px, 2.0 * width_px if self._puzzles[number] else 0.0)
         return None if place is None else np.tile(place, 2) + 1.2 * width_px * np.array([-1.0, -1.0, 1.0, 1.0])
 
     def _place(self, name: str, shown: bool, width_px: float, margin_px: float = 0.0) -> tuple[float, float] | None:
-        """Put a thing where a cube would be `width_px` wide in half-size images, its middle off the border."""
+        """Put an object where a cube would be `width_px` wide in half-size images, its middle off the border."""
         rng = self._rng
         if not shown:
             self._set(name, _HIDDEN)

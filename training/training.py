@@ -12,11 +12,11 @@ import torch
 from torch import Tensor, nn
 
 from training.assignment import assign
-from training.augmentation import Strength, closer_look, part_of
+from training.augmentation import Strength, part_of, second_look_crop
 from training.dataset import INPUT_PX, MOST, Shard
 from training.losses import detection_loss
 from training.network import STRIDES, Detector, cell_centers
-from vergence_metric.boxes.second_look import CROP_PX as CLOSER_PX
+from vergence_metric.boxes.second_look import CROP_PX as SECOND_LOOK_PX
 
 CROP_PX = (192, 144)
 _LOG_EVERY = 50
@@ -26,10 +26,10 @@ _LOG_EVERY = 50
 class Schedule:
     """How long [min of wall time] and how fast.
 
-    `closer_share` of the batches are second looks, cut as the node cuts them. Of the others, the first `crop_share` of
-    the time sees crops about the objects: most of a render is background, and a crop costs a third of it; then whole
-    renders, the last `plain_share` all but unchanged. The statistics of batch normalisation are held for the last
-    `held_share`: batches of several kinds differ in them, and a deployed network has but one set.
+    `second_look_share` of the batches are second looks, cropped as the detector does. The others are crops about the
+    objects in the first `crop_share` of the time, since most of a render is background and a crop costs a third of it;
+    then whole renders, in the last `plain_share` all but unchanged. The statistics of batch normalisation are held for
+    the last `held_share`: batches of several kinds differ in them, and a deployed network has only one set.
 
     Time, not steps, drives the learning rate: a busy machine trains less, but to the end of its cycle.
     """
@@ -37,8 +37,8 @@ class Schedule:
     minutes: float
     batch: int = 16
     crop_batch: int = 32
-    closer_batch: int = 48
-    closer_share: float = 0.4
+    second_look_batch: int = 48
+    second_look_share: float = 0.4
     crop_share: float = 0.85
     rate: float = 3e-3
     weight_decay: float = 0.02
@@ -52,14 +52,14 @@ class Schedule:
 def train(
     detector: Detector, shards: Callable[[], Shard], schedule: Schedule, folder: Path, say: Callable[[str], None]
 ) -> nn.Module:
-    """Train and return the averaged network; its state is kept in `folder` and taken up again from there.
+    """Train and return the averaged network; its state is saved in `folder`, from which a later call continues.
 
     Args:
         detector: the network, changed in place.
-        shards: gives the renders, asked again after every pass over them, so that they may still be growing.
+        shards: returns the renders; called again after every pass over them, so that there may be more.
         schedule: see there.
         folder: for `last.pt`.
-        say: takes lines of progress.
+        say: called with each line of progress.
 
     """
     averaged = deepcopy(detector).eval()
@@ -78,7 +78,7 @@ def train(
         averaged.load_state_dict(state["averaged"])
         optimiser.load_state_dict(state["optimiser"])
         step, spent_before_s = int(state["step"]), float(state["spent_s"])
-        say(f"taken up at step {step}, after {spent_before_s / 60:.1f} min")
+        say(f"continues at step {step}, after {spent_before_s / 60:.1f} min")
     started, began, total_s = time.monotonic(), step, schedule.minutes * 60
     share = spent_before_s / total_s
     batches = _batches(shards, schedule, step, lambda: share)
@@ -151,15 +151,15 @@ def _batches(
         while True:
             plain, cropped = share() >= 1 - schedule.plain_share, share() < schedule.crop_share
             strength = Strength(0.0, 0.0) if plain else Strength()
-            closer = rng.random() < schedule.closer_share
-            size_px = CLOSER_PX if closer else CROP_PX if cropped else INPUT_PX
-            count = schedule.closer_batch if closer else schedule.crop_batch if cropped else schedule.batch
+            second_look = rng.random() < schedule.second_look_share
+            size_px = SECOND_LOOK_PX if second_look else CROP_PX if cropped else INPUT_PX
+            count = schedule.second_look_batch if second_look else schedule.crop_batch if cropped else schedule.batch
             chosen = order[start : start + count]
             start += len(chosen)
             # A smaller batch at the end is left out, unless it is all there is.
             if start >= len(order) and start > len(chosen):
                 break
-            yield _batch(rng, data, chosen, strength, size_px, closer_look if closer else part_of)
+            yield _batch(rng, data, chosen, strength, size_px, second_look_crop if second_look else part_of)
 
 
 def _batch(

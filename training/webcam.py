@@ -1,4 +1,4 @@
-"""What a cheap camera makes of a render."""
+"""Image quality of a cheap camera."""
 
 import cv2
 import numpy as np

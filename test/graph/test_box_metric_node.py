@@ -1,4 +1,4 @@
-"""box_metric_node in one process with the eyes of the test, and a detector of red squares whose answers are known."""
+"""box_metric_node in one process with simulated eyes, and a detector of red squares with known outputs."""
 
 import math
 from pathlib import Path
@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import onnx
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from onnx import TensorProto, helper, numpy_helper
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Header
 
@@ -20,6 +18,10 @@ from vergence_metric.boxes import DetectorError
 from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.ros.box_metric_node import BoxMetricNode
 from vergence_msgs.msg import BoxVergence, StereoDetections
+from vergence_rig.parameters import RenamedParameterError
+
+onnx = pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
+TensorProto, helper, numpy_helper = onnx.TensorProto, onnx.helper, onnx.numpy_helper
 
 pytestmark = pytest.mark.graph
 
@@ -144,7 +146,7 @@ def test_with_cameras_and_joints_it_is_placed_in_space(graph: Any, node: BoxMetr
     eyes.describe()
     graph.wait_until(lambda: all(node._stereo.models), "the cameras are known")
     eyes.turn(START_NS + 100 * MS)
-    graph.wait_until(lambda: bool(node._joints._samples), "the joints are known")
+    graph.wait_until(lambda: node._joints.known, "the joints are known")
     future = graph.message(PoseWithCovarianceStamped, "vergence/target_point")
     graph.wait_until(lambda: node._point_publisher.get_subscription_count() > 0, "our subscription is known")
     message = answer(graph, node, eyes, scene(64), scene(48))
@@ -226,6 +228,20 @@ def test_parameters_that_cannot_be_are_refused_and_nothing_changes(graph: Any, n
 def test_a_model_that_is_not_there_ends_the_node_with_one_line(graph: Any) -> None:
     with pytest.raises(DetectorError, match=r"model /nowhere/gone\.onnx: no such file"):
         BoxMetricNode(context=graph.context, parameter_overrides=_overrides(**{"detector.model": "/nowhere/gone.onnx"}))
+
+
+@pytest.mark.parametrize(
+    ("former", "value", "present"),
+    [
+        ("iou", 0.5, r"detector\.iou_threshold"),
+        ("pair_vertical_px", 5.0, r"association\.max_vertical_px' \(in px\)"),
+        ("forget_s", 2.0, r"follow\.forget_after_s' \(in s\)"),
+        ("model", "", r"detector\.model"),
+    ],
+)
+def test_a_former_name_ends_the_node_with_the_present_one(graph: Any, former: str, value: Any, present: str) -> None:
+    with pytest.raises(RenamedParameterError, match=f"'{former}' was renamed: set '{present}"):
+        BoxMetricNode(context=graph.context, parameter_overrides=_overrides(**{former: value}))
 
 
 def _overrides(**values: Any) -> list[Any]:

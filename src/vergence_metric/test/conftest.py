@@ -1,12 +1,16 @@
-"""Detectors built with the onnx library whose answers are known: red and green cells of 16 px become boxes."""
+"""Detectors built with the onnx library with known outputs: red and green cells of 16 px become boxes."""
 
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import onnx
 import pytest
-from onnx import TensorProto, helper, numpy_helper
+
+try:
+    import onnx
+    from onnx import TensorProto, helper, numpy_helper
+except ImportError:  # no rosdep key names it
+    onnx = None
 
 STRIDES = (8, 16, 32)
 ANSWERING = 16
@@ -177,4 +181,6 @@ class ModelBuilder:
 @pytest.fixture
 def onnx_model(tmp_path: Path) -> Callable[..., Path]:
     """A maker of ONNX detectors of every layout."""
+    if onnx is None:
+        pytest.skip("the onnx package is not installed: pip install onnx")
     return ModelBuilder(tmp_path)

@@ -182,7 +182,7 @@ def test_a_cut_side_is_nan_and_the_others_stay():
     assert math.isnan(metric.center_px[0])
     assert metric.center_px[1] == pytest.approx(0.5)
     assert math.isnan(metric.size_ratio)
-    assert metric.trusted == (False, True, True, True)
+    assert metric.valid_sides == (False, True, True, True)
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import onnx
 import pytest
-from onnx import TensorProto, helper
 
 from vergence_metric.boxes.detector import Detector
 from vergence_metric.boxes.errors import (
@@ -16,7 +14,12 @@ from vergence_metric.boxes.errors import (
     ModelFileError,
     ModelLayoutError,
 )
+from vergence_metric.boxes.layouts import Candidates, Layout, register_layout, registry
 from vergence_metric.boxes.parameters import DetectorParameters
+from vergence_rig.parameters import ParameterError
+
+onnx = pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
+TensorProto, helper = onnx.TensorProto, onnx.helper
 
 LAYOUTS = {
     "yolov6": "yolov6",
@@ -43,7 +46,7 @@ def load(path: Path, **changes: object) -> Detector:
 
 @pytest.mark.parametrize("kind", LAYOUTS)
 def test_every_layout_is_found_and_read(kind, onnx_model):
-    # YOLOX takes BGR bytes: scores would be 255 times too high, so the test's model gets what it was made for.
+    # The input of YOLOX is BGR bytes, with which this model's scores would be 255 times too high.
     override = {"color": "rgb", "scale": "unit", "resize": "letterbox"} if kind == "yolox" else {}
     detector = load(onnx_model(kind), **override)
     assert detector.layout.name == LAYOUTS[kind]
@@ -84,7 +87,7 @@ def test_channels_and_range_can_be_overridden(onnx_model):
     assert byte.scores[0] == pytest.approx(255.0)
 
 
-def test_one_class_yolov6_is_told_from_end_to_end(onnx_model):
+def test_one_class_yolov6_is_distinguished_from_end_to_end(onnx_model):
     # Both are (1, N, 6); objectness is 1 throughout.
     detector = load(onnx_model("yolov6", classes=1))
     assert detector.layout.name == "yolov6"
@@ -92,7 +95,7 @@ def test_one_class_yolov6_is_told_from_end_to_end(onnx_model):
 
 
 def test_a_shape_that_could_be_two_layouts_asks_for_one(tmp_path):
-    """Rows that bear out neither reading: the shape alone does not tell."""
+    """Rows whose values agree with no layout: the shape alone does not decide."""
     rows = np.zeros((1, 252, 6), np.float32)  # 252 = cells of 128x96
     rows[..., :4] = [64, 48, 72, 56]
     rows[..., 4], rows[..., 5] = np.linspace(0.9, 0.1, 252), 0.0
@@ -124,6 +127,41 @@ def constant_model(folder: Path, output: np.ndarray, task: str = "") -> Path:
     path = folder / "constant.onnx"
     onnx.save(model, str(path))
     return path
+
+
+class CornerRows(Layout):
+    """A layout of one's own: rows of five columns, corners and score of one class."""
+
+    name = "corner_rows"
+    description = "rows of corners and score"
+
+    @classmethod
+    def matches(cls, warm_up):
+        fits = [i for i, output in enumerate(warm_up.outputs) if output.ndim == 3 and output.shape[2] == 5]
+        return cls((fits[0],), 1) if fits else None
+
+    def decode(self, outputs, input_px, threshold):
+        rows = np.asarray(outputs[0][0], np.float64)
+        return Candidates(rows[:, :4], rows[:, 4], np.zeros(len(rows), np.int64))
+
+
+def test_a_layout_of_ones_own_can_be_registered(tmp_path, monkeypatch):
+    path = constant_model(tmp_path, np.array([[[8, 16, 40, 64, 0.9], [8, 16, 41, 64, 0.7]]], np.float32))
+    with pytest.raises(ModelLayoutError, match="must have one of the detector layouts"):
+        load(path)
+    monkeypatch.setattr(registry, "_LAYOUTS", dict(registry._LAYOUTS))
+    register_layout(CornerRows)
+    for wanted in ("auto", "corner_rows"):
+        detector = load(path, layout=wanted)
+        assert detector.layout.name == "corner_rows"
+        np.testing.assert_allclose(detector.detect(picture()).xyxy_px, [[7.5, 15.5, 39.5, 63.5]], atol=1e-6)
+    with pytest.raises(ValueError, match="must be new: got 'corner_rows'"):
+        register_layout(CornerRows)
+
+
+def test_a_layout_that_is_not_registered_is_refused():
+    with pytest.raises(ParameterError, match="corner_rows"):
+        DetectorParameters(layout="corner_rows")
 
 
 def test_a_model_that_is_no_detector(tmp_path):

@@ -1,10 +1,9 @@
-"""The closer look at a box: where its crop lies, what it makes of sides and scores."""
+"""The second look at a box: where its crop lies, and its effect on sides and scores."""
 
 from pathlib import Path
 
 import cv2
 import numpy as np
-import onnx
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,6 +13,8 @@ from vergence_metric.boxes.layouts import Candidates
 from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.boxes.second_look import CROP_PX, MOST_LOOKS, Window, look_again
 from vergence_metric.boxes.session import SHIPPED_MODEL
+
+onnx = pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
 
 SIZE = (640, 480)
 FIRST_SCALE = 2.0
@@ -83,7 +84,7 @@ def test_the_look_with_the_finer_pixels_counts_more():
     np.testing.assert_allclose(alike, 0.5 * (fine + coarse), atol=1e-3)
 
 
-def test_a_thing_that_the_closer_look_denies_loses_half_its_score():
+def test_a_thing_that_the_second_look_does_not_find_loses_half_its_score():
     box = np.array([[100.0, 100, 160, 160]])
     boxes, scores = look_again(picture(box[0]), box, np.array([0.8]), np.array([0]), FIRST_SCALE, nothing)
     np.testing.assert_array_equal(boxes, box)

@@ -44,7 +44,7 @@ def view(surface, shift_px=0.0, vertical_px=0.0, roll_deg=0.0, gain=1.0, noise=0
 
 
 def estimator(name="affine", **changes):
-    return make_estimator(DisparityParameters(disparity_estimator=name, **changes))
+    return make_estimator(DisparityParameters(estimator=name, **changes))
 
 
 @pytest.mark.parametrize("name", estimator_names())
@@ -127,7 +127,7 @@ def test_unrelated_and_covered_eyes_do_not_match():
 
 def test_a_disparity_beyond_the_range_is_not_taken_for_one_within():
     surface = texture(11)
-    answer = estimator(disparity_max_px=40).estimate(view(surface), view(surface, 90.0))
+    answer = estimator(max_px=40).estimate(view(surface), view(surface, 90.0))
     assert not answer.ok
     assert answer.confidence < 0.5
 
@@ -135,10 +135,10 @@ def test_a_disparity_beyond_the_range_is_not_taken_for_one_within():
 @pytest.mark.parametrize(
     ("left", "right", "point", "words"),
     [
-        (np.zeros((10, 10), np.uint8), np.zeros((10, 11), np.uint8), None, r"\(10, 11\).*\(10, 10\)"),
-        (np.zeros((10, 10, 3), np.uint8), np.zeros((10, 10), np.uint8), None, "left image is uint8"),
-        (np.zeros((10, 10), np.uint8), np.zeros((10, 10), np.float32), None, "right image is float32"),
-        (np.zeros((10, 10), np.uint8), np.zeros((10, 10), np.uint8), (10.0, 3.0), r"\(10, 3\).*10x10"),
+        (np.zeros((10, 10), np.uint8), np.zeros((10, 11), np.uint8), None, r"\(10, 10\): got \(10, 11\)"),
+        (np.zeros((10, 10, 3), np.uint8), np.zeros((10, 10), np.uint8), None, "left image must be .*: got uint8"),
+        (np.zeros((10, 10), np.uint8), np.zeros((10, 10), np.float32), None, "right image must be .*: got float32"),
+        (np.zeros((10, 10), np.uint8), np.zeros((10, 10), np.uint8), (10.0, 3.0), r"10x10.*\(10, 3\)"),
         (np.zeros((0, 10), np.uint8), np.zeros((0, 10), np.uint8), None, "not empty"),
     ],
 )
@@ -153,7 +153,7 @@ class RowSearch(DisparityEstimator):
     name = "row_search"
 
     def __init__(self, parameters):
-        self._max_px = parameters.disparity_max_px
+        self._max_px = parameters.max_px
 
     def estimate_at(self, left, right, point_px, expected_px):
         x, y = round(point_px[0]), round(point_px[1])
@@ -175,13 +175,13 @@ def test_an_estimator_with_its_own_search_can_be_registered(row_search):
     answer = estimator("row_search").estimate(view(surface), view(surface, 37.0))
     assert answer.estimator == "row_search"
     assert answer.horizontal_px == pytest.approx(37.0)
-    chosen = {spec.name: spec for spec in DisparityParameters.specs()}["disparity_estimator"]
+    chosen = {spec.name: spec for spec in DisparityParameters.specs()}["estimator"]
     assert "row_search" in chosen.choices
 
 
 def test_a_registered_estimator_works_behind_the_depth_policy(row_search):
     surface = texture(13)
-    answer = estimator("row_search", disparity_depth_policy="largest").estimate(view(surface), view(surface, 37.0))
+    answer = estimator("row_search", depth_policy="largest").estimate(view(surface), view(surface, 37.0))
     assert answer.estimator == "row_search"
     assert answer.horizontal_px == pytest.approx(37.0)
 
@@ -200,11 +200,11 @@ def test_a_name_that_is_not_registered_is_refused():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"disparity_windows_px": (10.0, 5.0)}, "strictly increasing"),
-        ({"disparity_windows_px": ()}, "at least one"),
-        ({"disparity_box_px": (1.0, 2.0, 3.0)}, "x_min"),
-        ({"disparity_depth_policy": "box"}, "a box"),
-        ({"disparity_estimator": "census"}, "affine"),
+        ({"windows_px": (10.0, 5.0)}, "strictly increasing"),
+        ({"windows_px": ()}, "one or more"),
+        ({"box_px": (1.0, 2.0, 3.0)}, "x_min"),
+        ({"depth_policy": "box"}, "a box"),
+        ({"estimator": "census"}, "affine"),
     ],
 )
 def test_parameters_that_do_not_fit_are_named(changes, words):

@@ -81,12 +81,12 @@ class BoxFigures:
 
     @property
     def seen(self) -> str:
-        """Return what was found, in words."""
+        """Return the class and, unless it is ok, the status."""
         name = self.class_name or "no target"
         return name if self.status == "ok" else f"{name}: {self.status}" if self.class_name else name
 
     def as_json(self) -> dict[str, Any]:
-        """Return the figures for JSON, null where one is not known."""
+        """Return the figures for JSON, null where one is unknown."""
         return {
             "class": self.class_name or None,
             "status": self.status,
@@ -108,7 +108,7 @@ def corner_text(corners_px: Sequence[float]) -> str:
 
 
 def signed(value: float) -> str:
-    """Return a difference with its sign; a dash where it is not known."""
+    """Return a difference with its sign; a dash where it is unknown."""
     # Adding zero makes the zero that a negation left behind a plain one.
     return f"{round(value, 2) + 0.0:+.2f}" if math.isfinite(value) else "-"
 

@@ -1,4 +1,4 @@
-"""One picture of both eyes for people: every detection, the target's pair, and metric II's figures."""
+"""The overlay picture of both eyes: every detection, the target's pair, and metric II's figures."""
 
 import math
 from typing import Any
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from vergence_metric.boxes.detections import Box, Detections
 from vergence_metric.boxes.result import BoxStatus, BoxVergenceResult
 
-_TARGET_BGR, _OTHER_BGR, _DOUBT_BGR = (80, 220, 80), (200, 170, 60), (40, 160, 255)
+_TARGET_BGR, _OTHER_BGR, _UNCERTAIN_BGR = (80, 220, 80), (200, 170, 60), (40, 160, 255)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 def draw(left: NDArray[Any], right: NDArray[Any], result: BoxVergenceResult) -> NDArray[np.uint8]:
-    """Return both images (h, w, 3) or (h, w) side by side, (h, 2 w, 3) BGR: the target green, orange where in doubt."""
+    """Return both images (h, w, 3) or (h, w) side by side, (h, 2 w, 3) BGR: the target green, orange if not OK."""
     width = left.shape[1]
     picture = np.hstack([_colour(left), _colour(right)])
-    ink = _TARGET_BGR if result.status is BoxStatus.OK else _DOUBT_BGR
+    ink = _TARGET_BGR if result.status is BoxStatus.OK else _UNCERTAIN_BGR
     views: tuple[tuple[Detections, Box | None, int], ...] = (
         (result.left_detections, result.left, 0),
         (result.right_detections, result.right, width),

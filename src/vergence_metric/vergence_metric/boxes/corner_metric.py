@@ -18,14 +18,14 @@ class CornerMetric:
 
     `left_minus_right_px` is (top-left x, top-left y, bottom-right x, bottom-right y); `right_minus_left_px` is its
     negative, as the paper has both. `center_px` is the disparity of the centres, horizontal and vertical. `size_ratio`
-    is the right box's width over the left one's. `trusted` tells for (left, top, right, bottom) whether that side is
-    the object's in both eyes.
+    is the right box's width over the left one's. `valid_sides` is True for
+    those of (left, top, right, bottom) that are sides of the object in both eyes.
     """
 
     left_minus_right_px: Array
     center_px: Array
     size_ratio: float
-    trusted: tuple[bool, bool, bool, bool]
+    valid_sides: tuple[bool, bool, bool, bool]
 
     @property
     def right_minus_left_px(self) -> Array:
@@ -34,24 +34,24 @@ class CornerMetric:
 
 
 def corner_metric(left: Box, right: Box, hidden: tuple[bool, bool, bool, bool] = (False,) * 4) -> CornerMetric:
-    """Measure a pair; `hidden` names sides (left, top, right, bottom) that something covers in one eye."""
-    trusted = [not (a or b or c) for a, b, c in zip(left.cut, right.cut, hidden, strict=True)]
+    """Measure a pair; `hidden` is True for the sides (left, top, right, bottom) that are occluded in one eye."""
+    valid_sides = [not (a or b or c) for a, b, c in zip(left.cut, right.cut, hidden, strict=True)]
     difference = np.subtract(left.xyxy_px, right.xyxy_px, dtype=np.float64)
-    difference[[not good for good in trusted]] = math.nan
+    difference[[not good for good in valid_sides]] = math.nan
     # A centre needs both its sides: NaN passes through the mean.
     center = np.array([difference[[LEFT, RIGHT]].mean(), difference[[TOP, BOTTOM]].mean()])
-    whole = trusted[LEFT] and trusted[RIGHT]
+    whole = valid_sides[LEFT] and valid_sides[RIGHT]
     ratio = right.size_px[0] / left.size_px[0] if whole and left.size_px[0] > 0 else math.nan
-    return CornerMetric(difference, center, ratio, (trusted[0], trusted[1], trusted[2], trusted[3]))
+    return CornerMetric(difference, center, ratio, (valid_sides[0], valid_sides[1], valid_sides[2], valid_sides[3]))
 
 
 def hidden_sides(
     left: Box, right: Box, largest_ratio: float, disparity_px: float, vertical_px: float
 ) -> tuple[bool, bool, bool, bool]:
-    """Tell which sides something covers in one eye alone: where the boxes' sizes disagree.
+    """Return which sides are occluded in one eye only: where the boxes' sizes disagree.
 
-    The side whose disparity is further from the object's is the covered one; where the object's is unknown, both are
-    in doubt.
+    The side whose disparity is further from the object's is the occluded one; where the object's is unknown, both
+    count as occluded.
 
     Args:
         left: the left eye's box.

@@ -1,4 +1,4 @@
-"""A part of an image at another scale, cut about a box."""
+"""A part of an image at another scale, cropped around a box."""
 
 import math
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Crop:
         return np.asarray(cv2.warpAffine(source, matrix, self.size, flags=flags), np.uint8)
 
     def inside(self, box: Box) -> NDArray[np.bool_]:
-        """Tell which pixels (h, w) lie in a box."""
+        """Return which pixels (h, w) lie in a box."""
         x = self.x0 + self.scale * np.arange(self.size[0])
         y = self.y0 + self.scale * np.arange(self.size[1])
         x_min, y_min, x_max, y_max = box.xyxy_px

@@ -1,8 +1,8 @@
-"""Dense disparity inside a pair of boxes: flow for its sub-pixels, semi-global matching for what it cannot follow.
+"""Dense disparity inside a pair of boxes: flow for sub-pixel accuracy, semi-global matching where flow fails.
 
 Dense inverse search (Kroeger et al., "Fast optical flow using dense inverse search", 2016) is smooth and needs no rows
 that agree, but loses faces that one eye sees much narrower than the other. Semi-global matching (Hirschmueller, 2008)
-follows those, on rows that the flow has brought together. Each is believed where both directions agree.
+follows those, on rows that the flow has brought together. Each is used where both directions agree.
 """
 
 import math
@@ -31,7 +31,7 @@ _FAR = 1e3
 
 @dataclass(frozen=True)
 class DenseView:
-    """One eye's box: `disparity_px` (h, w) in image pixels, `found` where it is believed, `inside` the box's pixels."""
+    """One eye's box: `disparity_px` (h, w) in image pixels, `found` where it is valid, `inside` the box's pixels."""
 
     disparity_px: Plane
     found: Mask
@@ -71,11 +71,11 @@ def match_densely(
     insides = here.inside(left_box), there.inside(right_box)
     flows = _flow(*pictures), _flow(*pictures[::-1])
     agree = tuple(_disagreement(flows[i], flows[1 - i]) < _FLOW_AGREES_PX for i in (0, 1))
-    sure = insides[0] & agree[0]
-    if int(sure.sum()) < _LEAST_PIXELS:
+    consistent = insides[0] & agree[0]
+    if int(consistent.sum()) < _LEAST_PIXELS:
         return None
-    across = float(np.median(-flows[0][..., 0][sure]))
-    level = _levelled(pictures[1], flows[0], sure, across)
+    across = float(np.median(-flows[0][..., 0][consistent]))
+    level = _levelled(pictures[1], flows[0], consistent, across)
     matched = _semi_global(pictures[0], level, across)
     views = []
     for eye, sign in ((0, -1.0), (1, 1.0)):
@@ -85,7 +85,7 @@ def match_densely(
         disparity = start[0] + scale * np.where(take_smooth, smooth, steep)
         found = (take_smooth | steep_found) & insides[eye]
         views.append(DenseView(np.asarray(disparity, np.float32), found, insides[eye]))
-    vertical = start[1] - scale * float(np.median(flows[0][..., 1][sure]))
+    vertical = start[1] - scale * float(np.median(flows[0][..., 1][consistent]))
     return DenseMatch(views[0], views[1], vertical, scale)
 
 
@@ -112,11 +112,11 @@ def _disagreement(there: Plane, back: Plane) -> Plane:
     return np.asarray(np.hypot(error[..., 0], error[..., 1]), np.float32)
 
 
-def _levelled(right: NDArray[np.uint8], flow: Plane, sure: Mask, across: float) -> NDArray[np.uint8]:
-    """Return the right picture with its rows where the left ones are: mounts and tilt take a plane of the flow."""
-    x, y = _grid(sure.shape)
-    design = np.column_stack([np.ones(int(sure.sum())), x[sure], y[sure]]).astype(np.float64)
-    vertical = flow[..., 1][sure].astype(np.float64)
+def _levelled(right: NDArray[np.uint8], flow: Plane, consistent: Mask, across: float) -> NDArray[np.uint8]:
+    """Return the right picture with its rows where the left ones are, by a plane fitted to the vertical flow."""
+    x, y = _grid(consistent.shape)
+    design = np.column_stack([np.ones(int(consistent.sum())), x[consistent], y[consistent]]).astype(np.float64)
+    vertical = flow[..., 1][consistent].astype(np.float64)
     for _ in range(3):
         plane = np.linalg.lstsq(design, vertical, rcond=None)[0]
         off = np.abs(design @ plane - vertical)

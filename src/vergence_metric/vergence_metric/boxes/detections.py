@@ -1,4 +1,4 @@
-"""What a detector saw in one image."""
+"""The objects that a detector found in one image."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ _BORDER_PX = 1.5
 class Box:
     """One object's box in raw image pixels: origin at the centre of the top-left pixel, x right, y down.
 
-    `xyxy_px` are the box's outer sides, so that a box of one pixel is one wide. `cut` tells for (left, top, right,
-    bottom) which sides touch the image's border: those are not the object's.
+    `xyxy_px` are the box's outer sides, so that a box of one pixel is one wide. `cut` is True for those of
+    (left, top, right, bottom) that touch the image's border: they are not sides of the object.
     """
 
     xyxy_px: tuple[float, float, float, float]
@@ -92,7 +92,7 @@ def make_detections(
 
 
 def cut_sides(xyxy_px: NDArray[np.float64], image_size_px: tuple[int, int]) -> NDArray[np.bool_]:
-    """Tell for boxes (N, 4) which of their sides (left, top, right, bottom) lie at the image's border."""
+    """Return (N, 4), which sides (left, top, right, bottom) of boxes (N, 4) lie at the image's border."""
     width, height = image_size_px
     low, high = -0.5 + _BORDER_PX, (width - 0.5 - _BORDER_PX, height - 0.5 - _BORDER_PX)
     return np.column_stack(

@@ -24,7 +24,7 @@ _LEAST_CROP_SCORE = 0.05
 
 
 class Detector:
-    """A loaded detector. Loading runs it once, so that the first image is not late and its layout is known."""
+    """A loaded detector. Loading runs it once, so that the first image is not late and its layout is recognised."""
 
     def __init__(self, parameters: DetectorParameters, threads: int = 1) -> None:
         """Load the model that the parameters name.
@@ -164,13 +164,13 @@ def _class_ids(wanted: tuple[str, ...], names: tuple[str, ...]) -> NDArray[np.in
     if not wanted:
         return None
     ids = []
-    for word in wanted:
-        if word in names:
-            ids.append(names.index(word))
-        elif word.isdigit() and (not names or int(word) < len(names)):
-            ids.append(int(word))
+    for name in wanted:
+        if name in names:
+            ids.append(names.index(name))
+        elif name.isdigit() and (not names or int(name) < len(names)):
+            ids.append(int(name))
         else:
             raise ModelClassError(
-                f"class must be one of the model's ({', '.join(names) or 'numbers only'}): got {word!r}"
+                f"class must be one of the model's ({', '.join(names) or 'numbers only'}): got {name!r}"
             )
     return np.array(ids, np.int64)

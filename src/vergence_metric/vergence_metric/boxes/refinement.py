@@ -1,7 +1,7 @@
 """The disparity of the surface inside a pair of boxes: the mean over the pixels of it that both eyes see.
 
-A solid thing's box has no one disparity. A coarse match of the whole box finds it to a few pixels, dense matching then
-tells every pixel's, and what lies behind the object is left out.
+The box of a solid object has no single disparity. A coarse match of the whole box finds its disparity to a few pixels,
+dense matching then measures every pixel's, and what lies behind the object is left out.
 """
 
 import math
@@ -55,10 +55,10 @@ def refine(left: NDArray[Any], right: NDArray[Any], left_box: Box, right_box: Bo
         return _nothing(f"the box is smaller than {_LEAST_SIDE_PX:g} px")
     start = _coarse(left, right, left_box, right_box)
     if start is None:
-        return _nothing("the boxes hold nothing alike")
+        return _nothing("the contents of the two boxes do not correlate")
     dense = match_densely(left, right, left_box, right_box, start)
     if dense is None:
-        return _nothing("no place in the boxes could be matched")
+        return _nothing("dense matching found nothing consistent in the boxes")
     depth_px = max(_LEAST_DEPTH_PX, _DEPTH_SHARE * width)
     # As the object's pixels in both images count, so do those of both views.
     near = tuple(_near(view, depth_px) for view in (dense.left, dense.right))
@@ -67,7 +67,7 @@ def refine(left: NDArray[Any], right: NDArray[Any], left_box: Box, right_box: Bo
     )
     share = len(values) / max(int(dense.left.inside.sum() + dense.right.inside.sum()), 1)
     if share < _LEAST_SHARE:
-        return _nothing("too little of the boxes could be matched")
+        return _nothing("too small a share of the boxes could be matched")
     aside = side_values(dense, left_box, right_box, near)
     mean = (float(values.sum()) + sum(aside)) / (len(values) + len(aside))
     return Refinement(mean, dense.vertical_px, surface_sigma_px(left_box, share), share)

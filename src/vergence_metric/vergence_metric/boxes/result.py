@@ -1,4 +1,4 @@
-"""What metric II gives for one pair of images."""
+"""The result of metric II for one pair of images."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ UNREFINED = Refinement(math.nan, math.nan, math.nan, 0.0)
 
 
 class BoxStatus(IntEnum):
-    """Why there is an answer or none; the numbers are those of BoxVergence.msg."""
+    """Whether the pair could be measured, or why not; the numbers are those of BoxVergence.msg."""
 
     OK = 0
     NO_TARGET = 1
@@ -38,7 +38,7 @@ class BoxVergenceResult:
 
     `left` and `right` are the target's boxes, as smoothed, None where an eye does not see it. `metric` has the corner
     differences in raw pixels. `center_px`, `refined` are disparities of the boxes' centres and of the surface (mean
-    over what both eyes see), (horizontal, vertical), without lens distortion where the cameras are known; `center_rad`
+    over what both eyes see), (horizontal, vertical), without lens distortion if camera models are given; `center_rad`
     is the centres' in angle. `sigma_px` is the standard deviation of the horizontal `center_px`. `left_rad` and
     `right_rad` are the target's directions in each eye, azimuth (right positive) and elevation (down positive).
     `point` is where it is in rig_base, None if unknown.

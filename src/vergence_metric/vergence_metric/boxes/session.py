@@ -43,7 +43,7 @@ class InputSpec:
 
 
 class ModelSession:
-    """A loaded model; `run` takes one tensor and gives all outputs."""
+    """A loaded model; `run` feeds one tensor and returns all outputs."""
 
     def __init__(self, path: str | Path, device: str, threads: int) -> None:
         """Load a model.
@@ -72,7 +72,7 @@ class ModelSession:
             raise DetectorError(f"device must be one that this onnxruntime has ({here}): got {device!r}")
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
-        # Threads that spin while they wait would take the cores of other nodes.
+        # Threads that spin while they wait would occupy the cores of other nodes.
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         options.log_severity_level = 3
         providers = list(dict.fromkeys([provider, _PROVIDERS["cpu"]]))
@@ -149,8 +149,8 @@ class ModelSession:
 
 def _reason(error: Exception) -> str:
     text = _line(error)
-    for word in ("EfficientNMS", "BatchedNMS", "TRT_NMS", "TRT:", "TRTBatchedNMS"):
-        if word in text:
+    for name in ("EfficientNMS", "BatchedNMS", "TRT_NMS", "TRT:", "TRTBatchedNMS"):
+        if name in text:
             return (
                 "it was exported for TensorRT, whose plugins onnxruntime does not have: export it without end-to-end "
                 "suppression, or for onnxruntime"

@@ -18,7 +18,7 @@ _MATCHED = 0.6  # of a column's pixels: the face that could be matched has begun
 _BARE = 0.5  # of the pixels outside it unmatched: a turned object's corners are not a face
 _LEAST_SHARE = 0.05  # of the box's width: less changes nothing
 _LEAST_SEEN_PX = 2.0  # by the other eye: else that may not see the face at all
-_BESIDE = 3  # columns that tell the disparity where matching begins
+_BESIDE = 3  # columns from which the disparity where matching begins is taken
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class _Strip:
 
 
 def side_values(match: DenseMatch, left_box: Box, right_box: Box, near: tuple[NDArray[np.bool_], ...]) -> list[float]:
-    """Return the disparities [px] of the pixels of both eyes that are taken to be side faces.
+    """Return the disparities [px] of the pixels of both eyes that are classed as side faces.
 
     Args:
         match: of the boxes.

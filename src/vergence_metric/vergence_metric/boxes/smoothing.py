@@ -1,4 +1,4 @@
-"""Smoothing of boxes over time that lags a steady motion by exactly what it is told."""
+"""Smoothing of boxes over time with a lag behind a steady motion that is set exactly."""
 
 import math
 
@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 class LagLimitedFilter:
     """First-order low pass of a vector: behind a ramp by `lag_s`, at any sampling, and no more.
 
-    A sample's weight is dt / (dt + lag): for samples of an even beat dt the lag behind a ramp is dt (1 - w) / w = lag.
+    A sample's weight is dt / (dt + lag): at an even interval dt the lag behind a ramp is dt (1 - w) / w = lag.
     """
 
     def __init__(self, lag_s: float) -> None:
@@ -20,11 +20,11 @@ class LagLimitedFilter:
         self._stamp_s = math.nan
 
     def reset(self) -> None:
-        """Forget: the next sample is given back as it is."""
+        """Start anew: the next sample is returned as it is."""
         self._value = None
 
     def update(self, stamp_s: float, sample: Array) -> Array:
-        """Take a sample (k,) and return the smoothed one; a stamp that does not grow begins anew."""
+        """Add a sample (k,) and return the smoothed one; a stamp that does not increase starts anew."""
         if self._value is None or not stamp_s > self._stamp_s or self._value.shape != sample.shape:
             self._value = np.array(sample, np.float64)
         else:

@@ -1,4 +1,4 @@
-"""Disparity refined by a model that includes rotation, slant and gain: what survives real mounts.
+"""Disparity refined by a model that includes rotation, slant and gain: robust to real mounts.
 
 Gauss-Newton in the inverse compositional form (Baker and Matthews, "Lucas-Kanade 20 years on", 2004): the right image,
 warped, is a linear function of the left one, its gradients times the affine increments, gain and offset, all solved
@@ -61,14 +61,14 @@ def grow(
     pair: FoveaPair, horizontal_px: float, vertical_px: float, window_px: float, parameters: DisparityParameters
 ) -> Fit | None:
     """Fit in the window that decided, then in larger ones while they see the same surface; None if nothing fits."""
-    reach = radius_of(parameters.disparity_windows_px[-1]) + _REACH_PX
+    reach = radius_of(parameters.windows_px[-1]) + _REACH_PX
     x, blurred = pair.point_px[0], []
     for strip, middle in zip(pair.full, (x, x - horizontal_px), strict=True):
         near = strip.columns(round(middle) - reach, round(middle) + reach + 1)
         blurred.append(Strip(cv2.GaussianBlur(near.grey, (0, 0), _BLUR_PX), near.x0, near.y0))
     warp = np.array([[1.0, 0.0, -horizontal_px], [0.0, 1.0, -vertical_px]])
     best: Fit | None = None
-    for sigma in [w for w in parameters.disparity_windows_px if w >= window_px]:
+    for sigma in [w for w in parameters.windows_px if w >= window_px]:
         fit = fit_affine(blurred[0], blurred[1], pair.point_px, sigma, warp)
         # The same surface leaves the same residual; another depth in view raises it.
         if (
@@ -89,7 +89,7 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
 
     Args:
         left: the left strip, slightly blurred.
-        right: the right strip, blurred alike.
+        right: the right strip, blurred the same way.
         point_px: (x, y) of the point in the left image.
         sigma: of the Gaussian window [px].
         warp: (2, 3), where to start: linear part and translation (-disparity).
@@ -150,9 +150,9 @@ class _Window:
         return np.asarray((sampled + gain * ((x - near_x) * gx + (y - near_y) * gy)).ravel())
 
     def deviation(self, residual: Matrix) -> float:
-        """Return the standard deviation of the horizontal translation [px, times gain] that the residuals (N) speak of.
+        """Return the standard deviation of the horizontal translation [px, times gain] by the residuals (N).
 
-        What is left over is alike in neighbouring pixels (blur, edges, unmodelled depth): its effect is summed in
+        Residuals correlate between neighbouring pixels (blur, edges, unmodelled depth): their effect is summed in
         blocks before it is squared, as in estimates consistent under autocorrelation (Newey and West, 1987).
         """
         effect = self.roots * np.einsum("i,in->n", self.inverse[0], self.weighted) * residual
@@ -199,7 +199,7 @@ def _linearised(left: Strip, point_px: tuple[float, float], sigma: float) -> _Wi
 
 
 def _damping(sigma: float) -> Matrix:
-    """Return what holds the steps (8) back where the texture says little, as if by priors at a noise of 2 levels."""
+    """Return the damping of the steps (8) where texture is weak, as if by priors at a noise of 2 levels."""
     damping = np.zeros(8)
     noise = 4.0 / (2 * math.pi * sigma**2)
     # A small window barely sees roll and slant, and fitting them costs it its precision: there they stay as they are.

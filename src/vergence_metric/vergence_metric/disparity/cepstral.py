@@ -22,7 +22,7 @@ _ROUNDS = 3
 
 
 def measure_cepstral(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
-    """Return the disparity by the cepstrum about a match; None where its peak is at the edge of what was looked at."""
+    """Return the disparity by the cepstrum about a match; None where its peak is at the edge of the range."""
     sigma = measuring_window_px(match, parameters)
     side = side_of(sigma)
     left, right = pair.full

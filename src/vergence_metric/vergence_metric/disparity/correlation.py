@@ -1,4 +1,4 @@
-"""Windowed normalised cross-correlation of one point against a range of shifts, and what it is worth.
+"""Windowed normalised cross-correlation of one point against a range of shifts, and its uncertainty.
 
 The window is Gaussian, so that the point itself counts most. Correlation is invariant to gain and offset.
 """

@@ -1,8 +1,8 @@
-"""Whose disparity counts where several depths are in view.
+"""Which surface's disparity is estimated where several depths are in view.
 
-`center` asks the estimator at the point itself. The other policies first look at the surroundings coarsely (semi-global
-matching at half resolution), sort what they see into layers of one depth, choose a layer (`nearest`, `largest`, or the
-largest one inside a `box`) and ask the estimator at a point well inside of it.
+`center` estimates at the point itself. The other policies first match the surroundings coarsely (semi-global matching
+at half resolution), group the disparities into layers of one depth, choose a layer (`nearest`, `largest`, or the
+largest one inside a `box`) and estimate at a point well inside it.
 """
 
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ class Layer:
 
 
 class DepthPolicyEstimator(DisparityEstimator):
-    """Asks another estimator at the point that the policy chooses; the answer's `point_px` says where that was."""
+    """Runs another estimator at the point that the policy chooses; `point_px` of the result is that point."""
 
     def __init__(self, estimator: DisparityEstimator, parameters: DisparityParameters) -> None:
         self.name = estimator.name
@@ -39,26 +39,26 @@ class DepthPolicyEstimator(DisparityEstimator):
 
     def estimate_at(self, left: Image, right: Image, point_px: Point, expected_px: float | None) -> Disparity:
         """Return the disparity of the layer that the policy chooses about a point; see DisparityEstimator."""
-        seen = layers(left, right, self._area(left, point_px), self._parameters.disparity_max_px)
+        seen = layers(left, right, self._area(left, point_px), self._parameters.max_px)
         if not seen:
             found = self._estimator.estimate(left, right, point_px, expected_px)
             if not found.ok:
                 return found
-            reason = f"no layer is large enough for the policy {self._parameters.disparity_depth_policy}"
+            reason = f"no layer is large enough for the policy {self._parameters.depth_policy}"
             return replace(
                 found, confidence=min(found.confidence, 0.5), status=DisparityStatus.AMBIGUOUS, reason=reason
             )
-        if self._parameters.disparity_depth_policy == "nearest":
+        if self._parameters.depth_policy == "nearest":
             chosen = max(seen, key=lambda layer: layer.disparity_px)
         else:
             chosen = max(seen, key=lambda layer: layer.area_px)
         return self._estimator.estimate(left, right, chosen.point_px, chosen.disparity_px)
 
     def _area(self, left: Image, point: Point) -> tuple[int, int, int, int]:
-        """Return x, y, width and height of what is looked at: the box, or a square about the point."""
+        """Return x, y, width and height of the area that is matched: the box, or a square about the point."""
         height, width = left.shape
-        if self._parameters.disparity_depth_policy == "box":
-            x_min, y_min, x_max, y_max = (round(side) for side in self._parameters.disparity_box_px)
+        if self._parameters.depth_policy == "box":
+            x_min, y_min, x_max, y_max = (round(side) for side in self._parameters.box_px)
         else:
             x_min, y_min = round(point[0]) - _HALF_SIDE_PX, round(point[1]) - _HALF_SIDE_PX
             x_max, y_max = x_min + 2 * _HALF_SIDE_PX, y_min + 2 * _HALF_SIDE_PX

@@ -1,6 +1,6 @@
 """Disparity as the shift that minimises the truncated edge metric: chamfer search on distance transforms.
 
-The same edges and the same nearest-edge distances as metric I, so this is what the metric itself would steer by:
+The same edges and the same nearest-edge distances as metric I, so this is the shift at which the metric is least:
 for every shift the mean over one eye's edge pixels of the distance to the other's nearest edge, at most a few pixels,
 weighted towards the point, both directions averaged (Barrow et al., "Parametric correspondence and chamfer matching",
 1977; Borgefors, 1988).
@@ -26,7 +26,7 @@ _EDGE_SHARE = 0.15  # of the pixels are edges: the threshold follows the texture
 
 
 def measure_edge_shift(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
-    """Return the disparity by edge distances about a match; None without edges or with the minimum at the rim."""
+    """Return the disparity by edge distances about a match; None without edges or a minimum inside the range."""
     sigma = measuring_window_px(match, parameters)
     radius = math.ceil(2.0 * sigma)
     outer = radius + _REACH_PX

@@ -21,8 +21,8 @@ register_estimator("gabor", shared_search(measure_gabor))
 
 
 def make_estimator(parameters: DisparityParameters) -> DisparityEstimator:
-    """Return the estimator that `parameters.disparity_estimator` names, behind the depth policy."""
-    estimator = estimator_builder(parameters.disparity_estimator)(parameters)
-    if parameters.disparity_depth_policy == "center":
+    """Return the estimator that `parameters.estimator` names, behind the depth policy."""
+    estimator = estimator_builder(parameters.estimator)(parameters)
+    if parameters.depth_policy == "center":
         return estimator
     return DepthPolicyEstimator(estimator, parameters)

@@ -1,4 +1,4 @@
-"""How sure a match is, as a share of like answers that are right."""
+"""Confidence of a match: the share of matches with the same evidence that are right."""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Evidence:
-    """What speaks for a match.
+    """The evidence for a match.
 
     `correlation` is its windowed correlation, `independent` the number of independent samples in the window, `places`
-    how many shifts were tried, `rival` the best correlation of another candidate (0 if there is none) and
-    `left_right_px` how far matching back misses. `ceiling` is the confidence of what it rests on.
+    how many shifts were tried, `second` the best correlation of another candidate (0 if there is none) and
+    `left_right_px` how far matching back misses. `ceiling` is the confidence of the coarser match it depends on.
     """
 
     correlation: float
     independent: float
     places: float
-    rival: float
+    second: float
     left_right_px: float
     ceiling: float = 1.0
 
@@ -27,7 +27,8 @@ class Evidence:
 
     @property
     def significance(self) -> float:
-        """How far the correlation lies above chance, in standard deviations (Fisher's z), less the luck of the best.
+        """How far the correlation lies above chance, in standard deviations (Fisher's z), less the
+        expected maximum.
 
         The best of n unrelated places lies about sqrt(2 ln n) deviations above none.
         """
@@ -42,14 +43,14 @@ class Evidence:
 
     @property
     def confidence(self) -> float:
-        """Share of answers with this evidence that lie within 2 px of the truth, from 0 to 1."""
+        """Share of matches with this evidence that lie within 2 px of the truth, from 0 to 1."""
         if self.correlation <= 0.0:
             return 0.0
         certain = 1.0 / (1.0 + math.exp(-2.0 * (self.significance - 1.5)))
-        unique = min(max(2.0 * (1.0 - self.rival / self.correlation), 0.0), 1.0)
+        unique = min(max(2.0 * (1.0 - self.second / self.correlation), 0.0), 1.0)
         returns = 1.0 if self.left_right_px <= 2.0 else 0.1
         return min(certain * unique * returns, self.ceiling)
 
     def at_most(self, confidence: float) -> "Evidence":
-        """Return the same evidence for an answer that can be no surer than this."""
+        """Return the same evidence with a confidence of at most this."""
         return replace(self, ceiling=min(self.ceiling, confidence))

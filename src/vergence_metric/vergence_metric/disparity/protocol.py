@@ -1,4 +1,4 @@
-"""What every disparity estimator takes and gives."""
+"""The protocol of disparity estimators: `estimate` of a pair of images at a point returns a `Disparity`."""
 
 import math
 from abc import ABC, abstractmethod
@@ -17,7 +17,7 @@ class DisparityInputError(ValueError):
 
 
 class DisparityStatus(IntEnum):
-    """Why there is an answer or none; the numbers are those of VergenceError.msg."""
+    """Whether the disparity could be measured, or why not; the numbers are those of VergenceError.msg."""
 
     OK = 0
     NO_TEXTURE = 1
@@ -33,9 +33,9 @@ class Disparity:
     `horizontal_px` is x_left - x_right, `vertical_px` is y_left - y_right of the world point seen at `point_px` (x, y)
     of the left image; positive horizontal means nearer than where the axes cross. `sigma_px` is the standard deviation
     of the horizontal one by image noise and texture; that of `affine` also by what its model misses. `confidence` is
-    the share of answers with the same evidence that lie within 2 px of the truth (see `evidence.py`). Where `status`
-    is not OK the figures are NaN, except that an OUT_OF_RANGE or AMBIGUOUS answer keeps its best guess for those who
-    log it; its confidence is at most 0.5.
+    the share of estimates with the same evidence that lie within 2 px of the truth (see `evidence.py`). Where `status`
+    is not OK the figures are NaN, except that an OUT_OF_RANGE or AMBIGUOUS one keeps its best guess for the log; its
+    confidence is at most 0.5.
     """
 
     horizontal_px: float
@@ -49,17 +49,21 @@ class Disparity:
 
     @property
     def ok(self) -> bool:
-        """True if the answer may be used."""
+        """True if the estimate may be used."""
         return self.status is DisparityStatus.OK
 
     @classmethod
     def none(cls, status: DisparityStatus, reason: str, estimator: str, point_px: Point) -> "Disparity":
-        """Return the absence of an answer, and why."""
+        """Return an estimate without a value, and why."""
         return cls(math.nan, math.nan, math.nan, 0.0, status, reason, estimator, point_px)
 
 
 class DisparityEstimator(ABC):
-    """Anything that answers with the disparity at a point; `name` is what it is selected by."""
+    """Estimates the disparity at a point of the left image, by whatever search.
+
+    Subclasses implement `estimate_at`. `name` is what the parameter `disparity.estimator` selects it by, and what it
+    reports as `Disparity.estimator`. `register_estimator` adds it; it is then built with the DisparityParameters.
+    """
 
     name: str
 
@@ -72,7 +76,8 @@ class DisparityEstimator(ABC):
             left: (h, w) grey image of the left eye.
             right: (h, w) grey image of the right eye, of the same size, rows roughly aligned.
             point_px: (x, y) in the left image; None for its centre ((w - 1)/2, (h - 1)/2).
-            expected_px: where the horizontal disparity should be about: searched first, and alone if that is sure.
+            expected_px: approximate horizontal disparity, None if unknown. An estimator may search there first and stop
+                if that match is confident.
 
         Raises:
             DisparityInputError: images that are not grey uint8 of one size, or a point outside them.
@@ -82,22 +87,20 @@ class DisparityEstimator(ABC):
 
     @abstractmethod
     def estimate_at(self, left: Image, right: Image, point_px: Point, expected_px: float | None) -> Disparity:
-        """Return the same for images and a point that were checked."""
+        """Return the disparity at a point, for images and a point that are already checked; see `estimate`."""
 
 
 def _checked_point(left: Image, right: Image, point_px: Point | None) -> Point:
     """Return the point asked for, the centre if None; raise DisparityInputError for input that cannot be."""
     for name, image in (("left", left), ("right", right)):
         if image.ndim != 2 or image.dtype != np.uint8 or image.size == 0:
-            raise DisparityInputError(
-                f"{name} image is {image.dtype} {image.shape}: allowed is uint8 (h, w), not empty"
-            )
+            raise DisparityInputError(f"{name} image must be uint8 (h, w), not empty: got {image.dtype} {image.shape}")
     if left.shape != right.shape:
-        raise DisparityInputError(f"right image is {right.shape}: allowed is the left one's size {left.shape}")
+        raise DisparityInputError(f"right image must be of the left one's size {left.shape}: got {right.shape}")
     height, width = left.shape
     if point_px is None:
         return (width - 1) / 2, (height - 1) / 2
     x, y = float(point_px[0]), float(point_px[1])
     if not (0.0 <= x <= width - 1 and 0.0 <= y <= height - 1):
-        raise DisparityInputError(f"point is ({x:g}, {y:g}): allowed is inside the {width}x{height} image")
+        raise DisparityInputError(f"point must be inside the {width}x{height} image: got ({x:g}, {y:g})")
     return x, y

@@ -1,10 +1,9 @@
-"""Find where the point of the left image lies in the right one: the smallest window that is sure decides.
+"""Search for the point of the left image in the right one: the smallest window with an unambiguous match decides.
 
-Small windows see the surface at the point itself and no other, but many places look alike to them; large windows are
-sure, but of whatever fills them. So the small window names the candidates that it cannot tell from its best, and each
-larger window may only choose among those. Where only a large window is sure, it names the vicinity, in which the small
-ones look again: a small thing before a background is found beside the background. Every answer is checked the other
-way, from right to left.
+A small window holds only the surface at the point, but correlates at many places; a large one is unambiguous, but
+matches whatever surface fills it. So the small window proposes the candidates that correlate about as well as its best,
+and each larger window chooses among those. Where only a large window is unambiguous, the small ones search again near
+its match: a small object before a background is found beside the background. Every match is checked from right to left.
 """
 
 import math
@@ -28,9 +27,9 @@ _SAME_PX = 4.0  # candidates of different windows this close are one
 
 @dataclass(frozen=True)
 class Match:
-    """Where the point was found: disparities in full-resolution pixels, the window that decided, and how sure it is.
+    """Where the point was found: disparities in full-resolution pixels, the window that decided, and its evidence.
 
-    `status` is OK, or says why there is no answer; the disparity is then the best guess, NaN if there is none.
+    `status` is OK, or why there is no match; the disparity is then the best guess, NaN if there is none.
     """
 
     horizontal_px: float
@@ -42,28 +41,28 @@ class Match:
     reason: str
 
     @property
-    def sure(self) -> bool:
-        """True if the answer is more likely right than not."""
+    def confident(self) -> bool:
+        """True if the match is OK and more likely right than not."""
         return self.status is DisparityStatus.OK and self.evidence.confidence > 0.5
 
 
 def pair_about(left: Image, right: Image, point_px: tuple[float, float], parameters: DisparityParameters) -> FoveaPair:
     """Return the crops that a search about this point needs."""
-    margin = radius_of(max(parameters.disparity_windows_px)) + 4
-    reach = parameters.disparity_max_px + max(_VICINITY_PX, parameters.disparity_track_px)
-    return FoveaPair(left, right, point_px, reach, parameters.disparity_max_vertical_px + 4, margin)
+    margin = radius_of(max(parameters.windows_px)) + 4
+    reach = parameters.max_px + max(_VICINITY_PX, parameters.track_px)
+    return FoveaPair(left, right, point_px, reach, parameters.max_vertical_px + 4, margin)
 
 
 def find(pair: FoveaPair, parameters: DisparityParameters, expected_px: float | None = None) -> Match:
-    """Find the point: about the expected disparity if that is sure, else over the whole range.
+    """Find the point: near the expected disparity if that match is confident, else in the whole range.
 
-    An answer about the expected disparity is AMBIGUOUS, and keeps its figures, where another one far from it fits as
-    well: who has reason to trust the expectation may use it.
+    A match near the expected disparity is AMBIGUOUS, and keeps its values, where one far from it fits as well; a caller
+    with reason to trust the expectation may use it.
     """
     search = _Search(pair, parameters)
-    if expected_px is not None and abs(expected_px) <= parameters.disparity_max_px:
-        near = search.near(expected_px, parameters.disparity_track_px)
-        if near.sure:
+    if expected_px is not None and abs(expected_px) <= parameters.max_px:
+        near = search.near(expected_px, parameters.track_px)
+        if near.confident:
             return search.against_far(near)
     return search.wide()
 
@@ -97,7 +96,7 @@ class _Search:
     def _layer(self, window_px: float, middle_px: float, half_px: int, scale: int) -> _Layer:
         left, right, at = self._at(scale)
         middle, half = round(middle_px / scale), half_px // scale
-        vertical = -(-self._parameters.disparity_max_vertical_px // scale)
+        vertical = -(-self._parameters.max_vertical_px // scale)
         surface = correlate(left, right, at, window_px / scale, (middle - half, middle + half), (-vertical, vertical))
         disparities = (surface.first_d + np.arange(surface.zncc.shape[1])) * scale
         x = self._pair.point_px[0] - disparities
@@ -105,7 +104,7 @@ class _Search:
         return _Layer(surface, window_px, scale, np.where(visible, surface.profile, -1.0), visible)
 
     def _wide_layer(self, window_px: float) -> _Layer:
-        reach = self._parameters.disparity_max_px
+        reach = self._parameters.max_px
         return self._layer(window_px, 0, reach, _wide_scale(window_px))
 
     def near(self, middle_px: float, half_px: int) -> Match:
@@ -116,43 +115,43 @@ class _Search:
     def wide(self) -> Match:
         """Search the whole range, then the vicinity of what a large window found."""
         match = self._decide(self._wide_layer, _wide_scale)
-        if not match.sure or match.window_px <= self._parameters.disparity_windows_px[0]:
+        if not match.confident or match.window_px <= self._parameters.windows_px[0]:
             return match
         vicinity = self.near(match.horizontal_px, _VICINITY_PX)
-        if not vicinity.sure or vicinity.window_px >= match.window_px:
+        if not vicinity.confident or vicinity.window_px >= match.window_px:
             return match
-        # It can be no surer than that this is the vicinity.
+        # Its confidence is at most that of the coarser match.
         return replace(vicinity, evidence=vicinity.evidence.at_most(match.evidence.confidence))
 
     def against_far(self, near: Match) -> Match:
-        """Look whether the windows from the one that decided on would have fitted elsewhere in the whole range."""
-        rivals: list[int] | None = None
-        rival = 0.0
-        for window_px in self._parameters.disparity_windows_px:
+        """Return the match, AMBIGUOUS where its window and all larger ones also fit elsewhere in the whole range."""
+        others: list[int] | None = None
+        second = 0.0
+        for window_px in self._parameters.windows_px:
             if window_px < near.window_px:
                 continue
             layer = self._wide_layer(window_px)
             own = layer.surface.peak_near(near.horizontal_px / layer.scale, 2 // layer.scale)[2]
-            floor = 1.0 - _unexplained(own, self._parameters.disparity_uniqueness)
+            floor = 1.0 - _unexplained(own, self._parameters.uniqueness)
             peaks = [
                 p
                 for p in _peaks(layer.profile)
                 if layer.profile[p] ** 2 >= floor
-                and abs(layer.disparity(p) - near.horizontal_px) > self._parameters.disparity_track_px
-                and (rivals is None or any(abs(layer.disparity(p) - r) <= _SAME_PX for r in rivals))
+                and abs(layer.disparity(p) - near.horizontal_px) > self._parameters.track_px
+                and (others is None or any(abs(layer.disparity(p) - r) <= _SAME_PX for r in others))
             ]
             if not peaks:
                 return near
-            rivals = [layer.disparity(p) for p in peaks]
-            rival = max(float(layer.profile[p]) for p in peaks) / max(own, 1e-3)
-        evidence = replace(near.evidence, rival=min(rival, 1.0) * near.evidence.correlation)
+            others = [layer.disparity(p) for p in peaks]
+            second = max(float(layer.profile[p]) for p in peaks) / max(own, 1e-3)
+        evidence = replace(near.evidence, second=min(second, 1.0) * near.evidence.correlation)
         return replace(
             near, evidence=evidence, status=DisparityStatus.AMBIGUOUS, reason="another disparity fits as well"
         )
 
     def _decide(self, layer_of: Callable[[float], _Layer], scale_of: Callable[[float], int]) -> Match:
-        """Let each window choose among what the smaller ones left over; none is looked at that is not needed."""
-        texture, windows = self._parameters.disparity_minimum_texture, self._parameters.disparity_windows_px
+        """Let each window choose among the candidates of the smaller ones, until one match is confident."""
+        texture, windows = self._parameters.min_texture, self._parameters.windows_px
         scale = scale_of(windows[-1])
         left, _, at = self._at(scale)
         if texture_about(left, at, windows[-1] / scale).signal < texture:
@@ -169,7 +168,7 @@ class _Search:
             columns = self._candidates(layer, candidates)
             candidates = [layer.disparity(c) for c in columns]
             match = self._judge(layer, columns)
-            if match.sure:
+            if match.confident:
                 return match
             if best is None or match.evidence.confidence >= best.evidence.confidence:
                 best = match
@@ -177,7 +176,7 @@ class _Search:
         return best
 
     def _candidates(self, layer: _Layer, before: list[int] | None) -> list[int]:
-        """Return the columns of the peaks that this window cannot tell from its best, best first."""
+        """Return the columns of the peaks that fit about as well as the best, best first."""
         peaks = _peaks(layer.profile)
         if before is not None:
             near = [p for p in peaks if any(abs(layer.disparity(int(p)) - b) <= _SAME_PX for b in before)]
@@ -185,23 +184,23 @@ class _Search:
         if len(peaks) == 0:
             return []
         top = float(layer.profile[peaks].max())
-        floor = 1.0 - _unexplained(top, self._parameters.disparity_uniqueness)
+        floor = 1.0 - _unexplained(top, self._parameters.uniqueness)
         kept = peaks[layer.profile[peaks] ** 2 >= floor]
         return [int(p) for p in kept[np.argsort(-layer.profile[kept])]]
 
     def _judge(self, layer: _Layer, columns: list[int]) -> Match:
-        """Weigh the best candidate of one window."""
+        """Judge the best candidate of one window."""
         if not columns:
             return _nothing(DisparityStatus.NO_MATCH, "nothing in the right image fits", layer.window_px)
         surface, scale = layer.surface, layer.scale
         i, j, value = surface.peak_near(surface.first_d + columns[0], 0)
         horizontal, vertical = surface.subpixel(i, j)
-        rival = max((float(layer.profile[c]) for c in columns[1:] if abs(c - i) * scale > 3), default=0.0)
+        second = max((float(layer.profile[c]) for c in columns[1:] if abs(c - i) * scale > 3), default=0.0)
         evidence = Evidence(
             correlation=value,
             independent=surface.texture.independent,
             places=float(surface.zncc.size),
-            rival=rival,
+            second=second,
             left_right_px=self._left_right_error(layer, i, j),
         )
         sigma_px = scale * deviation_px(surface, value)
@@ -209,11 +208,11 @@ class _Search:
         rows, width = surface.zncc.shape
         if not evidence.beyond_chance:
             return Match(*guess, DisparityStatus.NO_MATCH, f"the best correlation, {value:.2f}, may be chance")
-        if rival > 0.0:
+        if second > 0.0:
             return Match(*guess, DisparityStatus.AMBIGUOUS, f"{len(columns)} disparities fit about as well")
         if i in (0, width - 1) or (rows > 1 and j in (0, rows - 1)):
             return Match(*guess, DisparityStatus.OUT_OF_RANGE, "the best fit lies at the edge of the searched range")
-        if evidence.left_right_px > self._parameters.disparity_left_right_px:
+        if evidence.left_right_px > self._parameters.left_right_px:
             reason = f"matching back from the right image misses by {evidence.left_right_px:.1f} px"
             return Match(*guess, DisparityStatus.NO_MATCH, reason)
         return Match(*guess, DisparityStatus.OK, "")
@@ -245,7 +244,7 @@ def _peaks(profile: NDArray[np.float32]) -> NDArray[np.intp]:
 
 
 def _unexplained(correlation: float, uniqueness: float) -> float:
-    """Return the share of grey-level variance that a rival may leave unexplained and still count as fitting as well.
+    """Return the share of grey-level variance that a second may leave unexplained and still count as fitting as well.
 
     30 % more than the best leaves, for noise, and what sampling and perspective leave unexplained of a true match.
     """

@@ -34,7 +34,7 @@ class SharedSearchEstimator(DisparityEstimator):
     """Finds the point by `search.find`, which also gives the confidence, then refines the place by `measure`."""
 
     def __init__(self, measure: LocalMeasure, parameters: DisparityParameters) -> None:
-        self.name = parameters.disparity_estimator
+        self.name = parameters.estimator
         self._measure, self._parameters = measure, parameters
 
     def estimate_at(self, left: Image, right: Image, point_px: Point, expected_px: float | None) -> Disparity:

@@ -28,7 +28,7 @@ def tapered(window: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
 
 def measuring_window_px(match: Match, parameters: DisparityParameters) -> float:
     """Return the window to measure in: the one that decided, as it holds one surface, but at least the second one."""
-    windows = parameters.disparity_windows_px
+    windows = parameters.windows_px
     return max(match.window_px, windows[min(1, len(windows) - 1)])
 
 

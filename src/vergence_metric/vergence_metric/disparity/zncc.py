@@ -11,7 +11,7 @@ _REACH_PX = 3
 
 
 def measure_zncc(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
-    """Return the parabola's peak of the correlation at full resolution, None if it lies at the rim."""
+    """Return the parabola's peak of the correlation at full resolution, None if it lies at the edge of the range."""
     left, right = pair.full
     at = (round(pair.point_px[0]), round(pair.point_px[1]))
     d, v = round(match.horizontal_px), round(match.vertical_px)

@@ -17,7 +17,7 @@ POINT_FRAME = "rig_base"
 
 
 def box_message(box: Box | None) -> BoundingBox:
-    """Return a box; all NaN where there is none."""
+    """Return a box as a message; all NaN for None."""
     if box is None:
         nan = math.nan
         return BoundingBox(x_min_px=nan, y_min_px=nan, x_max_px=nan, y_max_px=nan, score=nan, class_id=-1)
@@ -76,7 +76,7 @@ def box_vergence_message(result: BoxVergenceResult, header: Header, pair_skew_s:
 
 
 def detections_message(result: BoxVergenceResult, header: Header, pair_skew_s: float) -> StereoDetections:
-    """Return everything seen in both eyes."""
+    """Return all detections of both eyes."""
     return StereoDetections(
         header=header,
         pair_skew_s=pair_skew_s,
@@ -86,7 +86,7 @@ def detections_message(result: BoxVergenceResult, header: Header, pair_skew_s: f
 
 
 def point_message(point: TargetPoint, header: Header) -> PoseWithCovarianceStamped:
-    """Return where the target is, in rig_base; its orientation is not known and spread over the whole turn."""
+    """Return where the target is, in rig_base; its orientation is unknown, with a covariance of a whole turn."""
     message = PoseWithCovarianceStamped(header=Header(stamp=header.stamp, frame_id=POINT_FRAME))
     place = message.pose.pose.position
     place.x, place.y, place.z = (float(value) for value in point.point_m)

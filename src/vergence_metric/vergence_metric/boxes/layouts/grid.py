@@ -1,4 +1,4 @@
-"""What the layouts share that give one or more rows for every cell of the strides' grids."""
+"""Base of the layouts with one or more rows for every cell of the strides' grids."""
 
 import math
 from collections.abc import Sequence

@@ -47,14 +47,14 @@ class Layout(ABC):
     """One layout of a detector's outputs. Subclasses are frozen dataclasses; an instance belongs to one model.
 
     `outputs` are the indices of the outputs that `decode` needs, in its order, `classes` is the number of classes,
-    None if neither shape nor metadata give it, and `strides` are the strides [px] of the grid, if there is one.
+    None if neither shape nor metadata contain it, and `strides` are the strides [px] of the grid, if there is one.
     """
 
     name: ClassVar[str]
     """What the parameter `detector.layout` and the metadata entry `layout` select it by."""
 
     description: ClassVar[str]
-    """Its outputs in a few words, for logs and errors."""
+    """Short description of its outputs, for logs and errors."""
 
     suppressed: ClassVar[bool] = False
     """True if the model itself has removed overlapping boxes."""

@@ -11,7 +11,7 @@ from vergence_metric.boxes.preprocessing import Preprocessing
 
 
 class YoloX(GridLayout):
-    """`[1, N, 5 + classes]` as YOLOv6 has it, but boxes are offsets and logarithms in strides; takes BGR bytes."""
+    """`[1, N, 5 + classes]` as YOLOv6 has it, but boxes are offsets and logarithms in strides. Input: BGR bytes."""
 
     name = "yolox"
     description = "rows of undecoded centre and size, objectness and class scores"

@@ -1,10 +1,10 @@
-"""The detector's training: its labels and pictures agree, and its figures are what their definitions say. No torch."""
+"""The detector's training, without torch: labels and pictures agree, figures follow their definitions."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from training.augmentation import Strength, closer_look, part_of
+from training.augmentation import Strength, part_of, second_look_crop
 from training.average_precision import ImageResult, average_precision, iou_matrix, mean_average_precision
 from training.evaluation import Scores
 from training.head_views import head_views
@@ -137,7 +137,7 @@ def test_every_look_alike_has_six_faces_and_a_size(kind: str) -> None:
     assert SMALLEST_PX[kind] >= 6.5
 
 
-class TestCloserLook:
+class TestSecondLookCrop:
     @pytest.mark.parametrize("seed", range(40))
     def test_boxes_follow_the_picture(self, seed: int) -> None:
         rng = np.random.default_rng(seed)
@@ -146,7 +146,7 @@ class TestCloserLook:
         box = np.rint(np.concatenate([low, low + rng.uniform(16, 140, 2)])).astype(np.float32)
         image[int(box[1]) : int(box[3]), int(box[0]) : int(box[2])] = 255
         alikes = np.array([[500, 380, 560, 440]], np.float32)
-        picture, found = closer_look(rng, image, box[None], alikes, (96, 96), PLAIN)
+        picture, found = second_look_crop(rng, image, box[None], alikes, (96, 96), PLAIN)
         assert picture.shape == (96, 96, 3)
         bright = picture[..., 0] > 147
         if not len(found):
@@ -156,16 +156,16 @@ class TestCloserLook:
         seen = [columns[0], rows[0], columns[-1] + 1, rows[-1] + 1]
         np.testing.assert_allclose(found[0], seen, atol=1.5)
 
-    def test_objects_and_look_alikes_are_looked_at_alike_often(self) -> None:
+    def test_objects_and_look_alikes_are_cropped_equally_often(self) -> None:
         rng, image = np.random.default_rng(0), np.zeros((*SHAPE, 3), np.uint8)
         box, alike = np.array([[40, 40, 100, 100]], np.float32), np.array([[400, 300, 460, 360]], np.float32)
-        looks = [closer_look(rng, image, box, alike, (96, 96), PLAIN)[1] for _ in range(400)]
+        looks = [second_look_crop(rng, image, box, alike, (96, 96), PLAIN)[1] for _ in range(400)]
         assert 0.4 < np.mean([len(found) > 0 for found in looks]) < 0.6
 
     def test_an_empty_render_can_be_looked_at(self) -> None:
         nothing = np.empty((0, 4), np.float32)
         rng, image = np.random.default_rng(0), np.zeros((*SHAPE, 3), np.uint8)
-        picture, found = closer_look(rng, image, nothing, nothing, (96, 96), Strength())
+        picture, found = second_look_crop(rng, image, nothing, nothing, (96, 96), Strength())
         assert picture.shape == (96, 96, 3)
         assert not len(found)
 
