@@ -1,4 +1,4 @@
-"""How well contrast tells vergence from clutter, on scenes it was not fitted on, and how far windows agree."""
+"""How well contrast separates vergence from clutter on held-out scenes, and how far windows agree."""
 
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -15,26 +15,30 @@ from bench.contrast_scenes import (
     UNSEEN_DRAWINGS,
     UNSEEN_PHOTOGRAPHS,
     Degradation,
-    JudgedPair,
+    LabelledPair,
     cut,
     exposed,
-    judged_pairs,
+    labelled_pairs,
     textured,
 )
 from bench.results import Row
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.alignment.parameters import AlignmentParameters
+from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
+from vergence_metric.measurement.parameters import VergedParameters
 from vergence_sim.parameters import SimParameters
 
-JUDGING = EdgeMetricParameters(windows_px=(50, 100), align="none")
+EDGES = EdgeParameters(windows_px=(50, 100))
+UNALIGNED = AlignmentParameters(mode="none")
+THRESHOLD = VergedParameters().enter_contrast
 PAIRS = 600
 LARGEST_VERGED_PX, SMALLEST_UNVERGED_PX, LARGEST_UNVERGED_PX = 1.0, 8.0, 150.0
 
 
 def run(say: Callable[[str], None]) -> list[Row]:
-    """Measure the judge on hard and clean pairs it was not fitted on, then the windows' agreement."""
+    """Measure the classification of hard and clean held-out pairs, then the windows' agreement."""
     fitted, _, _ = _best(*(_foveal(m) for m in _measured(FITTED_DRAWINGS, FITTED_PHOTOGRAPHS, HARD, seed=10)))
-    say(f"threshold that fits the fitted scenes best: {fitted:.2f}; shipped: {JUDGING.verged_contrast:g}")
+    say(f"threshold that fits the fitted scenes best: {fitted:.2f}; shipped: {THRESHOLD:g}")
     rows: list[Row] = []
     for suffix, degradation in (("", HARD), (".clean", Degradation())):
         verged, unverged = _measured(UNSEEN_DRAWINGS, UNSEEN_PHOTOGRAPHS, degradation, seed=20, real=True)
@@ -52,9 +56,9 @@ def _judged(
 ) -> list[Row]:
     """Return the rows of one set: error at the shipped threshold, and misses where one in 100 unverged passes."""
     contrast = _foveal(verged), _foveal(unverged)
-    at_shipped = _balanced_error(*contrast, JUDGING.verged_contrast)
+    at_shipped = _balanced_error(*contrast, THRESHOLD)
     _, _, missed = _best(*contrast)
-    raw = [_best(_raw(verged, window), _raw(unverged, window)) for window in range(len(JUDGING.windows_px))]
+    raw = [_best(_raw(verged, window), _raw(unverged, window)) for window in range(len(EDGES.windows_px))]
     raw_error, raw_missed = min(figures[1] for figures in raw), min(figures[2] for figures in raw)
     say(
         f"{suffix or '.hard'}: {len(verged)} verged, {len(unverged)} not; error {at_shipped:.2%} at the shipped "
@@ -79,10 +83,10 @@ def _measured(
     results = []
     for offset, disparity in ((0, _verged_disparity), (1, _unverged_disparity)):
         rng = np.random.default_rng(seed + offset)
-        pairs = list(judged_pairs(rng, drawings, photographs, PAIRS, degradation, disparity))
+        pairs = list(labelled_pairs(rng, drawings, photographs, PAIRS, degradation, disparity))
         if real:
             pairs += list(stereo_pairs(rng, PAIRS // 6, degradation, disparity))
-        results.append([EdgeMetric(JUDGING).measure(pair.left, pair.right) for pair in pairs])
+        results.append([EdgeMetric(EDGES, alignment=UNALIGNED).measure(pair.left, pair.right) for pair in pairs])
     return results[0], results[1]
 
 
@@ -106,7 +110,7 @@ def _motorcycle() -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.
 
 def stereo_pairs(
     rng: np.random.Generator, count: int, degradation: Degradation, disparity_px: Callable[[np.random.Generator], float]
-) -> Iterator[JudgedPair]:
+) -> Iterator[LabelledPair]:
     """Yield views of a real stereo pair (Middlebury's motorcycle) about points of known disparity.
 
     Only points whose depth fills half of the 50 px around them: where nothing does, nothing there can be verged on.
@@ -126,7 +130,7 @@ def stereo_pairs(
         if textured(left_view):
             made += 1
             right_view = cut(right, right_x, y, side, side, degradation.roll_rad)
-            yield JudgedPair(
+            yield LabelledPair(
                 exposed(left_view, rng, degradation.noise_sigma),
                 exposed(right_view, rng, degradation.noise_sigma, degradation.gain),
                 wanted,
@@ -150,7 +154,7 @@ def _rendered_pairs() -> tuple[list[EdgeMetricResult], list[EdgeMetricResult]]:
     unverged: list[EdgeMetricResult] = []
     for error_rad, frame in frames(hard, range(20, 23), 16, errors, seed=7):
         if frame.truth.target == "cube" and np.linalg.norm(frame.truth.target_point_m) < 0.6:
-            result = EdgeMetric(JUDGING).measure(frame.left, frame.right)
+            result = EdgeMetric(EDGES, alignment=UNALIGNED).measure(frame.left, frame.right)
             (verged if error_rad == 0.0 else unverged).append(result)
     return verged, unverged
 
@@ -184,11 +188,11 @@ def _best(verged: NDArray[np.float64], unverged: NDArray[np.float64]) -> tuple[f
 
 def _window_spread(say: Callable[[str], None]) -> list[Row]:
     """Return how far the windows of 100 to 300 px agree on a verged target before a room."""
-    metric = EdgeMetricParameters(windows_px=(100, 150, 200, 250, 300))
+    edges = EdgeParameters(windows_px=(100, 150, 200, 250, 300))
     plain: list[float] = []
     robust: list[float] = []
     for _, frame in frames(SimParameters(), range(30, 33), 10, [0.0], seed=9):
-        result = EdgeMetric(metric).measure(frame.left, frame.right)
+        result = EdgeMetric(edges).measure(frame.left, frame.right)
         for figures, into in (
             (result.left_to_right_px, plain),
             (result.right_to_left_px, plain),

@@ -1,4 +1,4 @@
-"""Signed disparity at the fovea: every estimator and its peers on the same pairs, and how honest the confidence is."""
+"""Signed disparity at the fovea: every estimator and its peers on the same pairs, and their confidence."""
 
 import math
 import time
@@ -27,7 +27,7 @@ _WRONG_PX = 2.0
 
 
 def run(say: Callable[[str], None]) -> list[Row]:
-    """Measure; all rows are in the issue's names, the best peer beside each estimator."""
+    """Measure; each estimator's row has the best peer beside it."""
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
@@ -93,7 +93,7 @@ def _deceived() -> list[Row]:
     rng = np.random.default_rng(5)
     false: dict[str, int] = {}
     for k, (kind, pair) in enumerate(deceptive(_DECEPTIVE, 4)):
-        # Every other time with an expectation that nothing supports.
+        # Every other pair with a wrong expected disparity.
         expected_px = None if k % 2 else float(rng.uniform(-100, 100))
         answer = estimator.estimate(pair.left, pair.right, None, expected_px)
         wrong = pair.disparity_px is None or not abs(answer.horizontal_px - pair.disparity_px) <= _WRONG_PX

@@ -9,20 +9,21 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from bench.results import Row
+from vergence_metric.alignment.parameters import AlignmentParameters
 from vergence_metric.edges.chance import chance_levels
 from vergence_metric.edges.contrast import contrasts, foveal_contrast
 from vergence_metric.edges.edge_distance import EdgeDistances, edge_distances
 from vergence_metric.edges.edges import Edges, detect_edges
 from vergence_metric.edges.nearest_edges import NearestEdges
 from vergence_metric.edges.oriented_edges import oriented_field
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.edges.robust import robust_distances
 from vergence_metric.edges.windows import Window, centre_windows
 from vergence_metric.measurement.edge_metric import EdgeMetric
 
 Mask = NDArray[np.uint8]
 
-PARAMETERS = EdgeMetricParameters(align="none")
+PARAMETERS = EdgeParameters()
 SHIFT_PX = 7
 
 
@@ -79,7 +80,9 @@ def _whole_pair_rows(say: Callable[[str], None]) -> list[Row]:
     rows, picture, per_pixel_ns = [], chessboard_picture(), {}
     for height, width in ((240, 320), (480, 640), (1080, 1920)):
         sizes = tuple(round(size * height / 480) for size in (50, 100, 150, 200, 250, 300))
-        metric = EdgeMetric(EdgeMetricParameters(windows_px=sizes, align="calibrated", align_vertical_px=1.0))
+        metric = EdgeMetric(
+            EdgeParameters(windows_px=sizes), alignment=AlignmentParameters(mode="calibrated", vertical_px=1.0)
+        )
         left, right = (cv2.cvtColor(view, cv2.COLOR_GRAY2BGR) for view in views(picture, height, width))
         best_ms = _best_ms(lambda: metric.measure(left, right), 200 if height < 1080 else 40)  # noqa: B023
         per_pixel_ns[height] = best_ms * 1e6 / (height * width)

@@ -1,9 +1,9 @@
-"""Pairing of two free-running, jittered, lossy streams: is every pair the true nearest, and what does a frame cost?
+"""Pairing of two free-running, jittered, lossy streams: share of correct pairs, and cost of a frame.
 
 Ten minutes of two 30 Hz cameras whose clocks differ by 0.1 %, so that their phase passes through the whole period again
 and again: exposure jitter of 0.5 ms, a transport delay of 4 to 9 ms, every 50th frame lost on average. The truth is
 found afterwards from all frames that arrived: of the frames left, the first two that are each other's nearest, at most
-the slop apart. The peer is a greedy queue with the behaviour of the synchroniser that users know: a message is matched
+the slop apart. The peer is a greedy queue that behaves as ROS's approximate-time synchroniser: a message is matched
 on arrival with the nearest one in the other queue, less than the slop apart.
 """
 
@@ -74,7 +74,7 @@ class GreedyQueue:
         self._queues: tuple[dict[int, int], dict[int, int]] = ({}, {})
 
     def add(self, side: int, stamp_ns: int) -> Match | None:
-        """Take a message; return the pair it makes, if any."""
+        """Add a message; return the pair that it completes, if any."""
         own, others = self._queues[side], self._queues[1 - side]
         own[stamp_ns] = stamp_ns
         while len(own) > self._size:
@@ -97,8 +97,8 @@ class Outcome:
 
 
 def run_pairer(arrivals: list[Arrival]) -> Outcome:
-    """Pair by the pairer, woken at its deadlines as the node's timer does."""
-    pairer: StereoPairer[int] = StereoPairer(PairingParameters(pair_slop_s=SLOP_NS * 1e-9))
+    """Pair with the pairer, called at its deadlines as by the node's timer."""
+    pairer: StereoPairer[int] = StereoPairer(PairingParameters(slop_s=SLOP_NS * 1e-9))
     pairs, delays = [], []
     started = time.perf_counter()
     for arrival in arrivals:
@@ -125,7 +125,7 @@ def run_peer(arrivals: list[Arrival]) -> Outcome:
 
 
 def share_of_truth(pairs: list[Match], truth: list[Match]) -> float:
-    """Return the share of pairs that are true ones, of those given out or missing."""
+    """Return the true pairs as a share of all that were returned or missed."""
     return len(set(pairs) & set(truth)) / len(set(pairs) | set(truth))
 
 

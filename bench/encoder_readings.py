@@ -1,7 +1,7 @@
 """What the visual encoder reads of a simulated head: from features that are drawn, or from rendered images.
 
-The drawn ones stand in where hundreds of runs are wanted; how many they are and how far off is what bench_encoder
-measured on rendered rooms. Either way the cameras differ from their calibration by what the encoder is told to expect.
+Drawn features serve hundreds of runs; their number and errors are those that bench_encoder measured on rendered rooms.
+Either way the cameras differ from their calibration by the deviations that the encoder assumes.
 """
 
 import math
@@ -9,11 +9,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from vergence_gaze.estimation.observations import EyeRotationReading
+from vergence_gaze.estimation.observations import EyeRotationObservation
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_metric.eye_rotation.encoder import EyeRotationReading as Reading
 from vergence_metric.eye_rotation.encoder import VisualEncoder
-from vergence_metric.eye_rotation.parameters import EyeRotationNodeParameters
+from vergence_metric.eye_rotation.parameters import EncoderParameters, RestParameters
 from vergence_metric.eye_rotation.relative_rotation import RigPrior, relative_rotation
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, rotation_rig_from_eye
@@ -23,7 +23,8 @@ from vergence_sim.simulator import Simulator
 
 Array = npt.NDArray[np.float64]
 
-PARAMETERS = EyeRotationNodeParameters()
+PARAMETERS = EncoderParameters()
+REST_RAD = RestParameters().max_joint_rad
 MATCHES = 190
 WRONG_SHARE = 0.05
 COMMON_NOISE_PX = 0.08
@@ -32,26 +33,26 @@ READINGS_PER_REST = 3
 
 
 def miscalibrated(spec: CameraModel, random: np.random.Generator) -> CameraModel:
-    """Return a camera as a calibration might have found it, off by the deviations that the encoder reckons with."""
-    focal = 1.0 + random.normal(0.0, PARAMETERS.focal_doubt)
-    centre = random.normal(0.0, PARAMETERS.centre_doubt_px, 2)
+    """Return a camera as a calibration might have found it, off by the deviations that the encoder assumes."""
+    focal = 1.0 + random.normal(0.0, PARAMETERS.prior.focal_sigma)
+    centre = random.normal(0.0, PARAMETERS.prior.centre_sigma_px, 2)
     distortion = spec.distortion.copy()
-    distortion[0] += random.normal(0.0, PARAMETERS.distortion_doubt)
+    distortion[0] += random.normal(0.0, PARAMETERS.prior.distortion_sigma)
     k = [spec.fx_px * focal, 0, spec.cx_px + centre[0], 0, spec.fy_px * focal, spec.cy_px + centre[1], 0, 0, 1]
     return CameraModel.from_camera_info_values(spec.width_px, spec.height_px, k, distortion.tolist())
 
 
-class RestWatch:
-    """Tells whether a head's joints have reported the same angles since it was last asked, and for how many times."""
+class RestCounter:
+    """Counts how often in succession a head's joints have reported the same angles."""
 
     def __init__(self) -> None:
         self._said: Array | None = None
         self.times = 0
 
-    def rests(self, head: FakeHead) -> bool:
-        """Take the joints as they are reported now."""
+    def update(self, head: FakeHead) -> bool:
+        """Update with the joints' angles reported now."""
         said = np.array([head.reported_rad[name] for name in JOINT_NAMES])
-        same = self._said is not None and bool(np.abs(said - self._said).max() <= PARAMETERS.still_rad)
+        same = self._said is not None and bool(np.abs(said - self._said).max() <= REST_RAD)
         self.times = self.times + 1 if same else 0
         self._said = said
         return same
@@ -62,14 +63,14 @@ class DrawnFeatures:
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
-        self._watch = RestWatch()
+        self._rest = RestCounter()
         random = np.random.default_rng([seed, 1])
-        self._bend = random.normal(0.0, (PARAMETERS.focal_doubt, PARAMETERS.distortion_doubt), (2, 2))
-        self._centre = random.normal(0.0, PARAMETERS.centre_doubt_px, (2, 2))
+        self._bend = random.normal(0.0, (PARAMETERS.prior.focal_sigma, PARAMETERS.prior.distortion_sigma), (2, 2))
+        self._centre = random.normal(0.0, PARAMETERS.prior.centre_sigma_px, (2, 2))
 
-    def __call__(self, head: FakeHead) -> EyeRotationReading | None:
+    def __call__(self, head: FakeHead) -> EyeRotationObservation | None:
         """Return the reading, None while the eyes move or when they have been read often enough."""
-        if not self._watch.rests(head) or self._watch.times > READINGS_PER_REST:
+        if not self._rest.update(head) or self._rest.times > READINGS_PER_REST:
             return None
         focal_px = head.rig.left_camera.fx_px
         said = np.array([head.reported_rad[name] for name in JOINT_NAMES])
@@ -87,13 +88,13 @@ class DrawnFeatures:
             focal, lens = self._bend[eye]
             square = (view**2).sum(axis=1, keepdims=True)
             views.append(view * (1.0 + focal + lens * square) + self._centre[eye] / focal_px)
-        doubt = RigPrior(
-            focal=PARAMETERS.focal_doubt,
-            distortion=PARAMETERS.distortion_doubt,
-            centre_rad=PARAMETERS.centre_doubt_px / focal_px,
+        prior = RigPrior(
+            focal=PARAMETERS.prior.focal_sigma,
+            distortion=PARAMETERS.prior.distortion_sigma,
+            centre_rad=PARAMETERS.prior.centre_sigma_px / focal_px,
         )
-        found = relative_rotation(views[0], views[1], float(said[0]), float(said[1]), doubt)
-        return EyeRotationReading(head.time_s, 0.0, found.vergence_rad, found.sigma_rad)
+        found = relative_rotation(views[0], views[1], float(said[0]), float(said[1]), prior)
+        return EyeRotationObservation(head.time_s, 0.0, found.vergence_rad, found.sigma_rad)
 
     @staticmethod
     def _points(head: FakeHead, random: np.random.Generator) -> list[Array]:
@@ -120,20 +121,20 @@ class RenderedRooms:
             for spec in (rig.left_camera, rig.right_camera)
         ]
         self.readings: list[Reading] = []
-        """Every reading since the start, believed or not."""
+        """Every reading since the start, accepted or not."""
         self.errors_rad: list[float] = []
-        """By how much each believed one was off the true vergence."""
+        """Error of each accepted reading against the true vergence [rad]."""
 
     def begin(self, point_m: Array, seed: int) -> None:
         """Put a target somewhere for a run that begins now, with cameras that are miscalibrated anew."""
         random = np.random.default_rng([seed, 2])
         self._cameras = (miscalibrated(self._models[0], random), miscalibrated(self._models[1], random))
         self._simulator.place_target("cube", point_m)
-        self._watch = RestWatch()
+        self._rest = RestCounter()
 
-    def __call__(self, head: FakeHead) -> EyeRotationReading | None:
+    def __call__(self, head: FakeHead) -> EyeRotationObservation | None:
         """Return what is read of the head as it stands, None while it moves or has been read often enough."""
-        if not self._watch.rests(head) or self._watch.times > READINGS_PER_REST:
+        if not self._rest.update(head) or self._rest.times > READINGS_PER_REST:
             return None
         self._simulator.set_head(dict(zip(JOINT_NAMES, head.true_rad.tolist(), strict=True)))
         pair = self._simulator.capture()
@@ -141,10 +142,10 @@ class RenderedRooms:
         reading = self._encoder.measure(pair.left, pair.right, eyes, self._cameras)
         self.readings.append(reading)
         if not reading.ok or reading.rotation is None:
-            return EyeRotationReading(head.time_s, 0.0, math.nan, math.nan, usable=False, reason=reading.reason)
+            return EyeRotationObservation(head.time_s, 0.0, math.nan, math.nan, usable=False, reason=reading.reason)
         found = reading.rotation
         self.errors_rad.append(found.vergence_rad - float(head.true_rad[1] - head.true_rad[0]))
-        return EyeRotationReading(head.time_s, 0.0, found.vergence_rad, found.sigma_rad)
+        return EyeRotationObservation(head.time_s, 0.0, found.vergence_rad, found.sigma_rad)
 
     def close(self) -> None:
         """Free the renderer."""

@@ -20,10 +20,11 @@ from vergence_common.stamps import to_stamp
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import JointReport, Observation
 from vergence_gaze.goals.goal import Goal, GoalKind
+from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.ros import gaze_messages
 from vergence_metric.measurement.pair_measurement import PairMeasurement
-from vergence_metric.measurement.parameters import EdgeMetricNodeParameters
+from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.pairs.viewing_angles import angular_disparity
 from vergence_metric.ros import metric_messages
 from vergence_rig.camera import CameraModel
@@ -69,7 +70,7 @@ class MetricOfPairs:
     """edge_metric_node's work on a pair, as the observations that gaze_controller_node makes of its messages."""
 
     def __init__(self, rig: Rig, lenses: Mapping[str, Lens]) -> None:
-        self._measurement = PairMeasurement(EdgeMetricNodeParameters(), rig)
+        self._measurement = PairMeasurement(PairMeasurementParameters(), rig)
         left, right = (_model(lenses[eye]) for eye in EYES)
         self._models = left, right
         self._joints = JointHistory()
@@ -100,7 +101,7 @@ class MetricOfPairs:
         track = measurement.track(edge, left_stamp_s, eyes, models, [(ns * 1e-9, angles) for ns, angles in passed])
         angular = angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
         tracked = metric_messages.track_message(track, edge, angular, header, skew_s)
-        measurement.settle()
+        measurement.update_alignment()
         return [
             gaze_messages.edge_judgement(edges),
             gaze_messages.fovea_disparity(error, models[0].fx_px),
@@ -113,7 +114,7 @@ class Lockstep:
 
     def __init__(self, world: PhotoWorld, rig: Rig, parameters: GazeParameters | None = None) -> None:
         self.world = world
-        self.controller = GazeController(rig, parameters or GazeParameters(), CONTROL_PERIOD_S)
+        self.controller = GazeController(rig, parameters or gaze_parameters(), CONTROL_PERIOD_S)
         self.metric = MetricOfPairs(rig, world.lenses)
         self.on_step: Callable[[Any], None] = lambda command: None
         self.newest_exposure_s = -math.inf

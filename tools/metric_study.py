@@ -23,8 +23,9 @@ matplotlib.use("Agg")
 
 from matplotlib import pyplot as plt
 
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric
+from vergence_metric.measurement.parameters import VergedParameters
 from vergence_sim.fixation import fixated_surface, look_at
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
@@ -84,7 +85,7 @@ class Basin:
 
 def sweep(scene: Scene, windows_px: Sequence[int]) -> Sweep:
     """Turn the right eye past vergence while the left one holds the target, as the paper does, and measure."""
-    metric = EdgeMetric(EdgeMetricParameters(windows_px=tuple(windows_px)))
+    metric = EdgeMetric(EdgeParameters(windows_px=tuple(windows_px)))
     rows: dict[str, list[Figures]] = {form: [] for form in (*FORMS, "chance")}
     foveal = []
     with closing(Simulator(SimParameters.of({"world.seed": scene.world}))) as simulator:
@@ -136,7 +137,7 @@ def plot(result: Sweep, windows_px: Sequence[int], path: Path) -> None:
         label="chance, largest",
     )
     axes[2].plot(ERRORS_DEG, result.foveal, color="crimson", linewidth=1.6, label="foveal")
-    axes[2].axhline(EdgeMetricParameters().verged_contrast, color="crimson", linestyle=":", linewidth=1.0)
+    axes[2].axhline(VergedParameters().enter_contrast, color="crimson", linestyle=":", linewidth=1.0)
     for axis in axes:
         axis.set_ylim(bottom=0.0)
     lines = [*axes[0].get_lines()[: len(windows_px)], axes[0].get_lines()[-1], axes[2].get_lines()[-2]]
@@ -191,7 +192,7 @@ def page(results: Sequence[Sweep], windows_px: Sequence[int], images: Sequence[s
     ratio = np.array([r.figures["plain"][vergence].mean() / np.nanmedian(r.figures["plain"]) for r in results])
     judged = [(r.foveal[vergence], float(np.nanmin(r.foveal[np.abs(ERRORS_DEG) >= 1.0]))) for r in results]
     told_apart = [[r.scene.name, f"{v:.2f}", f"{u:.2f}"] for r, (v, u) in zip(results, judged, strict=True)]
-    threshold = EdgeMetricParameters().verged_contrast
+    threshold = VergedParameters().enter_contrast
     passing, dipping = (sum(pair[i] <= threshold for pair in judged) for i in (0, 1))
     return (
         f"""# The edge metric against vergence error
@@ -279,7 +280,7 @@ def main() -> int:
     pictures = out / "metric_study"
     pictures.mkdir(parents=True, exist_ok=True)
     cv2.setNumThreads(1)
-    windows_px = EdgeMetricParameters().windows_px
+    windows_px = EdgeParameters().windows_px
     results, images = [], []
     for number, scene in enumerate(SCENES, 1):
         print(f"{number}/{len(SCENES)} {scene.name}", flush=True)

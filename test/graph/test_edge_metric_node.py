@@ -17,7 +17,6 @@ from vergence_common.images import array_to_compressed, array_to_image
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_metric.measurement.edge_metric import EdgeMetric
-from vergence_metric.measurement.parameters import EdgeMetricNodeParameters
 from vergence_metric.ros.edge_metric_node import EdgeMetricNode
 from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
 
@@ -112,7 +111,7 @@ def has(status: DiagnosticStatus, text: str) -> bool:
 def test_a_pair_gives_the_pure_metric_and_the_shift_with_the_left_stamp(graph: Any, eyes: Eyes) -> None:
     left, right = view(0), view(7)
     edge, error, track = answers(graph, eyes, left, right, skew_ns=3 * MS)
-    pure = EdgeMetric(EdgeMetricNodeParameters()).measure(left, right)
+    pure = EdgeMetric().measure(left, right)
     assert edge.windows_px.tolist() == [50, 100, 150, 200, 250, 300]
     np.testing.assert_array_equal(edge.left_to_right_px, pure.left_to_right_px)
     np.testing.assert_array_equal(edge.right_to_left_px, pure.right_to_left_px)
@@ -150,7 +149,7 @@ def test_camera_info_of_another_size_is_named_and_not_used(graph: Any, eyes: Eye
     _, error, _ = answers(graph, eyes, view(0), view(7))
     assert error.status == VergenceError.STATUS_NO_CAMERA_INFO
     status = graph.diagnostic("cameras", lambda s: s.level == DiagnosticStatus.ERROR)
-    assert status.message == "left/camera_info is for 640x480, images are 320x240: angles are NaN"
+    assert status.message == "left/camera_info must be for 320x240 images: got 640x480; angles are NaN"
 
 
 def test_an_image_without_edges_gives_nan_and_a_status(graph: Any, eyes: Eyes) -> None:
@@ -184,10 +183,10 @@ def broken(message: Image, **changes: Any) -> Image:
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"encoding": "yuv422"}, "encoding is 'yuv422'"),
-        ({"height": 241}, "data has 230400 bytes: allowed is 231360"),
-        ({"step": 100}, "step is 100"),
-        ({"width": 0}, "size is 0x240"),
+        ({"encoding": "yuv422"}, "got 'yuv422'"),
+        ({"height": 241}, "data must have 231360 bytes (241 rows of 960): got 230400"),
+        ({"step": 100}, "got 100"),
+        ({"width": 0}, "size must be at least 1x1: got 0x240"),
     ],
 )
 def test_a_wrong_image_is_named_counted_and_survived(
@@ -205,7 +204,7 @@ def test_a_wrong_image_is_named_counted_and_survived(
 def test_images_of_different_size_are_named_and_survived(graph: Any, eyes: Eyes) -> None:
     eyes.show(view(0), view(0, 160, 120))
     status = graph.diagnostic("pairs", lambda s: s.level == DiagnosticStatus.ERROR)
-    assert status.message == "left images are 320x240, right ones 160x120: they must be alike"
+    assert status.message == "left and right images must have one size: got 320x240 and 160x120"
     assert values(status)["size_mismatches"] == "1"
     answers(graph, eyes, view(0), view(7))
 
@@ -217,7 +216,7 @@ def test_no_right_camera_is_named(graph: Any) -> None:
     left.publish(array_to_image(view(0), Header(stamp=from_nanoseconds(START_NS))))
     status = graph.diagnostic("right images", lambda s: s.level == DiagnosticStatus.ERROR)
     assert status.message.startswith("right/image_raw: no image since the start, ")
-    assert status.message.endswith(" s (nobody publishes it)")
+    assert status.message.endswith(" s (the topic has no publisher)")
 
 
 def test_a_stalled_stream_is_named(graph: Any) -> None:
@@ -226,7 +225,7 @@ def test_a_stalled_stream_is_named(graph: Any) -> None:
     status = graph.diagnostic("right images", lambda s: values(s).get("received") == "1" and has(s, "no image"))
     assert status.level == DiagnosticStatus.ERROR
     assert status.message.startswith("right/image_raw: no image for ")
-    assert "nobody" not in status.message
+    assert "publisher" not in status.message
 
 
 def test_stamps_that_never_meet_are_named_with_their_skew(graph: Any, node: EdgeMetricNode, eyes: Eyes) -> None:
@@ -236,7 +235,7 @@ def test_stamps_that_never_meet_are_named_with_their_skew(graph: Any, node: Edge
         eyes.show(view(0), view(7), skew_ns=40 * MS)
         graph.wait_until(lambda n=shown: list(received) == [n, n], "both images are taken")
     status = graph.diagnostic("pairs", lambda s: s.level == DiagnosticStatus.ERROR)
-    assert status.message == "never within slop: median skew 40 ms, pair_slop_s allows 20 ms"
+    assert status.message == "no pair since the start: median skew is 40 ms, pair.slop_s allows 20 ms"
     assert values(status)["pairs"] == "0"
 
 
@@ -293,7 +292,7 @@ def test_pairs_that_come_too_fast_are_dropped_and_counted_but_the_newest(
     status = graph.diagnostic("measurement", lambda s: values(s)["measured"] == "2")
     assert values(status)["dropped"] == "3"
     assert status.level == DiagnosticStatus.WARN
-    assert status.message == "too slow: 3 of 5 pairs were left out"
+    assert status.message == "measuring is too slow: 3 of 5 pairs were dropped"
 
 
 def test_a_failure_in_the_measurement_is_named_and_survived(
@@ -306,18 +305,20 @@ def test_a_failure_in_the_measurement_is_named_and_survived(
         patch.setattr(node._measurement, "edge", fail)
         eyes.show(view(0), view(7))
         status = graph.diagnostic("measurement", lambda s: s.level == DiagnosticStatus.ERROR)
-    assert status.message == "the last pair could not be measured: ArithmeticError: of the test"
+    assert status.message == "measuring the last pair failed: ArithmeticError: of the test"
     answers(graph, eyes, view(0), view(7))
     graph.diagnostic("measurement", lambda s: s.level == DiagnosticStatus.OK)
 
 
 def test_parameters_change_at_run_time_all_or_none(graph: Any, node: EdgeMetricNode, eyes: Eyes) -> None:
-    refused = graph.set_parameters(node, windows_px=[60, 120], canny_low=90.0, canny_high=10.0)
+    refused = graph.set_parameters(
+        node, **{"edges.windows_px": [60, 120], "edges.canny_low": 90.0, "edges.canny_high": 10.0}
+    )
     assert not refused.successful
     assert "canny_low" in refused.reason
     edge, _, _ = answers(graph, eyes, view(0), view(7))
     assert list(edge.windows_px) == [50, 100, 150, 200, 250, 300]
-    assert graph.set_parameters(node, windows_px=[60, 120], edge_method="fixed").successful
+    assert graph.set_parameters(node, **{"edges.windows_px": [60, 120], "edges.threshold_mode": "fixed"}).successful
     edge, _, _ = answers(graph, eyes, view(0), view(7))
     assert list(edge.windows_px) == [60, 120]
     assert len(edge.contrast) == len(edge.status) == 2
@@ -325,7 +326,7 @@ def test_parameters_change_at_run_time_all_or_none(graph: Any, node: EdgeMetricN
 
 
 def test_a_slop_set_at_run_time_is_used(graph: Any, node: EdgeMetricNode, eyes: Eyes) -> None:
-    assert graph.set_parameters(node, pair_slop_s=0.05).successful
+    assert graph.set_parameters(node, **{"pair.slop_s": 0.05}).successful
     edge, _, _ = answers(graph, eyes, view(0), view(7), skew_ns=40 * MS)
     assert edge.pair_skew_s == pytest.approx(0.04)
 

@@ -167,15 +167,15 @@ def test_what_the_servos_cannot_be_is_contradictory_and_a_diagnostic(graph: Any,
     assert "servos and mounts allow" in message.reason
     assert is_silent(message)
     status = graph.diagnostic("encoder", lambda s: s.level == DiagnosticStatus.WARN)
-    assert "not where they say" in status.message
+    assert "contradict the joint angles" in status.message
 
 
 def test_a_changed_rule_holds_from_the_next_pair_on(graph: Any, seen: StereoFrame) -> None:
     head = Head(graph)
     head.until(EyeRotation.STATUS_OK, seen.left, seen.right)
-    assert graph.set_parameters(head.node, most_sigma_rad=1e-5).successful
+    assert graph.set_parameters(head.node, **{"acceptance.max_sigma_rad": 1e-5}).successful
     message = head.until(EyeRotation.STATUS_UNCERTAIN, seen.left, seen.right)
-    assert "degrees only" in message.reason
+    assert "standard deviation" in message.reason
     refused = graph.set_parameters(head.node, rate_hz=0.0)
     assert not refused.successful
     assert "rate_hz" in refused.reason

@@ -55,5 +55,5 @@ def test_required_ones_are_shown_but_left_to_the_user(executable: str) -> None:
 
 
 def test_the_camera_reports_the_skew_at_which_pairs_are_refused() -> None:
-    slop = {shipped(name)["pair_slop_s"] for name in ("edge_metric_node", "box_metric_node")}
+    slop = {shipped(name)["pair"]["slop_s"] for name in ("edge_metric_node", "box_metric_node")}
     assert slop == {shipped("camera_node")["max_skew_s"]}

@@ -73,15 +73,15 @@ def test_starts_with_the_shipped_yaml_and_ends_cleanly(domain_id: int, number: s
     ("yaml", "complaint"),
     [
         (
-            "/**: {ros__parameters: {pair_slop_s: soon}}",
-            "parameter 'pair_slop_s' must be a number",
+            "/**: {ros__parameters: {pair: {slop_s: soon}}}",
+            "parameter 'pair.slop_s' must be a number",
         ),
         (
-            "/**: {ros__parameters: {blur_sigma_px: -1.0}}",
-            "parameter 'blur_sigma_px' must be a number",
+            "/**: {ros__parameters: {edges: {blur_sigma_px: -1.0}}}",
+            "parameter 'edges.blur_sigma_px' must be a number",
         ),
-        ("/**: {ros__parameters: {windows_px: [50, 0]}}", "parameter 'windows_px' is"),
-        ("/**: {ros__parameters: {canny_low: 90.0}}", "parameter 'canny_low' must be at most canny_high"),
+        ("/**: {ros__parameters: {edges: {windows_px: [50, 0]}}}", "parameter 'windows_px' is"),
+        ("/**: {ros__parameters: {edges: {canny_low: 90.0}}}", "parameter 'edges.canny_low' must be at most canny_high"),
         ("/**: {ros__parameters: {windows: [50]}}", "there is no parameter 'windows': its name must be one of "),
         ("/**: {ros__parameters: {rig: /nowhere/rig.yaml}}", "/nowhere/rig.yaml"),
         ("{ not: [yaml", "Couldn't parse params file"),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.alignment.alignment import Aligner, Alignment
 from vergence_metric.alignment.misalignment import estimate_misalignment
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.alignment.parameters import AlignmentParameters
 
 Grey = NDArray[np.uint8]
 CHESSBOARDS = Path(__file__).resolve().parents[4] / "shared" / "data" / "stereo_chessboard"
@@ -43,7 +43,7 @@ def grey(path: Path) -> Grey:
 
 
 def auto(**changes: object) -> Aligner:
-    return Aligner(EdgeMetricParameters.from_mapping(changes))
+    return Aligner(AlignmentParameters.from_mapping(changes))
 
 
 @pytest.mark.parametrize("disparity_px", [-120.0, 0.0, 90.0])
@@ -82,28 +82,28 @@ def test_convergence_is_not_taken_for_roll() -> None:
 
 
 def test_larger_than_allowed_is_clipped_and_said() -> None:
-    found = auto(align_max_vertical_px=5.0, align_max_roll_deg=1.0).update(*pair(6.5, 1.6))
+    found = auto(max_vertical_px=5.0, max_roll_rad=math.radians(1.0)).update(*pair(6.5, 1.6))
     assert found.bounded
     assert found.vertical_px == 5.0
     assert found.roll_rad == math.radians(1.0)
 
 
 def test_unrelated_or_blank_images_change_nothing() -> None:
-    aligner = auto(align_every_pairs=1)
+    aligner = auto(every_pairs=1)
     blank = np.full((480, 640), 80, np.uint8)
     for left, right in ((pair(0, 0)[0], pair(0, 0, seed=1)[0]), (blank, blank), (pair(0, 0)[0], blank)):
         found = aligner.update(left, right)
         assert not found.estimated
         assert found.vertical_px == 0.0
-    known = aligner.update(*pair(4.0, 0.5))
-    assert aligner.update(pair(0, 0)[0], blank).vertical_px == known.vertical_px
+    before = aligner.update(*pair(4.0, 0.5))
+    assert aligner.update(pair(0, 0)[0], blank).vertical_px == before.vertical_px
 
 
 def test_one_odd_pair_is_left_out_and_a_lasting_change_is_taken() -> None:
-    aligner = auto(align_every_pairs=1)
+    aligner = auto(every_pairs=1)
     for seed in range(3):
-        settled = aligner.update(*pair(3.0, 0.0, seed=seed))
-    assert settled.vertical_px == pytest.approx(3.0, abs=0.1)
+        filtered = aligner.update(*pair(3.0, 0.0, seed=seed))
+    assert filtered.vertical_px == pytest.approx(3.0, abs=0.1)
     assert aligner.update(*pair(-9.0, 0.0)).vertical_px == pytest.approx(3.0, abs=0.1)
     for _ in range(5):
         moved = aligner.update(*pair(-9.0, 0.0))
@@ -112,9 +112,9 @@ def test_one_odd_pair_is_left_out_and_a_lasting_change_is_taken() -> None:
 
 def test_none_and_calibrated_do_as_they_say() -> None:
     left, right = pair(4.0, 1.0)
-    none = auto(align="none").update(left, right)
+    none = auto(mode="none").update(left, right)
     assert (none.vertical_px, none.roll_rad, none.apply(right) is right) == (0.0, 0.0, True)
-    given = auto(align="calibrated", align_vertical_px=4.0, align_roll_deg=1.0).update(left, right)
+    given = auto(mode="calibrated", vertical_px=4.0, roll_rad=math.radians(1.0)).update(left, right)
     assert (given.vertical_px, given.roll_rad) == (4.0, math.radians(1.0))
 
 
@@ -140,13 +140,13 @@ def test_real_pairs_give_the_offset_of_their_board_corners(number: int) -> None:
 
 
 def test_later_estimates_wait_until_there_is_time() -> None:
-    aligner = auto(align_every_pairs=1)
+    aligner = auto(every_pairs=1)
     for seed in range(5):
         before = aligner.update(*pair(3.0, 0.0, seed=seed))
     assert aligner.update(*pair(3.8, 0.0)) == before, "the pair's own figures do not wait for it"
-    aligner.settle()
-    settled = aligner.update(*pair(3.8, 0.0))
-    assert settled.vertical_px > before.vertical_px + 0.05
-    aligner.settle()
-    aligner.settle()  # nothing is left to be done
-    assert aligner.update(*pair(3.8, 0.0)).vertical_px > settled.vertical_px + 0.01
+    aligner.update_alignment()
+    filtered = aligner.update(*pair(3.8, 0.0))
+    assert filtered.vertical_px > before.vertical_px + 0.05
+    aligner.update_alignment()
+    aligner.update_alignment()  # nothing is deferred any more
+    assert aligner.update(*pair(3.8, 0.0)).vertical_px > filtered.vertical_px + 0.01

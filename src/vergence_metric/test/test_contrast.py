@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from vergence_metric.edges.contrast import contrasts, foveal_contrast
 from vergence_metric.edges.edges import Edges, detect_edges
 from vergence_metric.edges.oriented_edges import OrientedField, oriented_field
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.edges.windows import Window, centre_windows
 
 
@@ -23,7 +23,7 @@ def picture(seed: int, height: int = 200, width: int = 320) -> NDArray[np.uint8]
 
 
 def edges_of(image: NDArray[np.uint8]) -> Edges:
-    return detect_edges(image, EdgeMetricParameters())
+    return detect_edges(image, EdgeParameters())
 
 
 def field(left: Edges, right: Edges, sizes: tuple[int, ...], truncation: int = 5, bins: int = 8) -> OrientedField:
@@ -152,5 +152,5 @@ def test_the_foveal_form_is_nan_without_edges() -> None:
 @pytest.mark.parametrize(("bins", "truncation"), [(0, 5), (9, 5), (8, 0), (8, 16)])
 def test_what_the_planes_cannot_hold_is_refused(bins: int, truncation: int) -> None:
     edges = edges_of(picture(1))
-    with pytest.raises(ValueError, match=f"truncation of {truncation} px, {bins} bins"):
+    with pytest.raises(ValueError, match=f"got {truncation} and {bins}"):
         field(edges, edges, (50,), truncation, bins)

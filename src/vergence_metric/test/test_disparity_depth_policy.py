@@ -36,10 +36,10 @@ def inside(point, box):
     ("changes", "disparity_px", "box"),
     [
         ({}, MIDDLE, MIDDLE_BOX),
-        ({"disparity_depth_policy": "nearest"}, NEAR, NEAR_BOX),
-        ({"disparity_depth_policy": "largest"}, FAR, (0, 0, 640, 480)),
-        ({"disparity_depth_policy": "box", "disparity_box_px": (355.0, 185.0, 415.0, 255.0)}, NEAR, NEAR_BOX),
-        ({"disparity_depth_policy": "box", "disparity_box_px": (60.0, 60.0, 160.0, 160.0)}, FAR, (60, 60, 161, 161)),
+        ({"depth_policy": "nearest"}, NEAR, NEAR_BOX),
+        ({"depth_policy": "largest"}, FAR, (0, 0, 640, 480)),
+        ({"depth_policy": "box", "box_px": (355.0, 185.0, 415.0, 255.0)}, NEAR, NEAR_BOX),
+        ({"depth_policy": "box", "box_px": (60.0, 60.0, 160.0, 160.0)}, FAR, (60, 60, 161, 161)),
     ],
 )
 def test_the_policy_picks_the_layer(scene, changes, disparity_px, box):
@@ -51,14 +51,14 @@ def test_the_policy_picks_the_layer(scene, changes, disparity_px, box):
 
 def test_a_blank_area_is_not_given_a_layer():
     blank = np.full((480, 640), 120, np.uint8)
-    answer = make_estimator(DisparityParameters(disparity_depth_policy="nearest")).estimate(blank, blank)
+    answer = make_estimator(DisparityParameters(depth_policy="nearest")).estimate(blank, blank)
     assert answer.status is DisparityStatus.NO_TEXTURE
     assert answer.confidence == 0.0
 
 
 def test_a_layer_too_small_for_the_policy_is_not_answered_surely(scene):
     box = (239.0, 179.0, 246.0, 186.0)
-    answer = make_estimator(DisparityParameters(disparity_depth_policy="box", disparity_box_px=box)).estimate(*scene)
+    answer = make_estimator(DisparityParameters(depth_policy="box", box_px=box)).estimate(*scene)
     assert answer.status is DisparityStatus.AMBIGUOUS
     assert answer.confidence <= 0.5
     assert "box" in answer.reason

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from vergence_metric.alignment.parameters import AlignmentParameters
 from vergence_metric.edges.edge_distance import WindowStatus
 from vergence_metric.edges.edges import ImageShapeError
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
 
 Grey = NDArray[np.uint8]
@@ -31,8 +32,8 @@ def picture(seed: int, height: int = 520, width: int = 800) -> Grey:
     return np.clip(120 + 45 * noise / max(noise.std(), 1e-9), 0, 255).astype(np.uint8)
 
 
-def measured(left: Grey, right: Grey, **parameters: object) -> EdgeMetricResult:
-    return EdgeMetric(EdgeMetricParameters.from_mapping({"align": "none", **parameters})).measure(left, right)
+def measured(left: Grey, right: Grey, edges: EdgeParameters | None = None) -> EdgeMetricResult:
+    return EdgeMetric(edges, alignment=AlignmentParameters(mode="none")).measure(left, right)
 
 
 def test_a_pair_that_is_one_image_reads_nothing_everywhere() -> None:
@@ -90,7 +91,7 @@ def test_a_covered_eye_gives_nan_and_the_reason_never_zero(blank_left: bool, bla
 @pytest.mark.parametrize(("height", "width"), [(1, 1), (7, 500), (240, 320), (241, 37), (720, 1280)])
 def test_any_image_size_is_measured(height: int, width: int) -> None:
     left, right = picture(8, height, width), picture(9, height, width)
-    found = EdgeMetric(EdgeMetricParameters()).measure(left, right)
+    found = EdgeMetric().measure(left, right)
     assert found.left_to_right_px.shape == (6,)
     fits = np.array([size <= min(height, width) for size in found.windows_px])
     with_edges = (found.left_edge_count > 0) & (found.right_edge_count > 0)
@@ -100,7 +101,7 @@ def test_any_image_size_is_measured(height: int, width: int) -> None:
 
 
 def test_images_of_two_sizes_are_refused_by_name() -> None:
-    with pytest.raises(ImageShapeError, match=r"left image is \(480, 640\), right is \(480, 600\)"):
+    with pytest.raises(ImageShapeError, match=r"got \(480, 640\) and \(480, 600\)"):
         measured(np.zeros((480, 640), np.uint8), np.zeros((480, 600), np.uint8))
 
 
@@ -108,7 +109,7 @@ def test_the_right_image_is_aligned_before_it_is_compared() -> None:
     scene = picture(10)
     left, right = scene[20:500, 80:720], scene[33:513, 80:720]  # y_left - y_right = 13
     raw = measured(left, right)
-    aligned = EdgeMetric(EdgeMetricParameters()).measure(left, right)
+    aligned = EdgeMetric().measure(left, right)
     assert aligned.alignment.vertical_px == pytest.approx(13.0, abs=0.1)
     assert (raw.contrast > 0.8).all()
     assert (aligned.contrast[:4] < 0.2).all()
@@ -156,7 +157,7 @@ def test_contrast_is_least_at_the_disparity_of_a_real_board_s_corners(number: in
     seen = view(left, x, y)
     shifts = np.arange(round(float(disparity)) - 12, round(float(disparity)) + 13)
     contrast = [
-        measured(seen, view(right, x - float(shift), y - float(vertical)), windows_px=(50,)).contrast[0]
+        measured(seen, view(right, x - float(shift), y - float(vertical)), EdgeParameters(windows_px=(50,))).contrast[0]
         for shift in shifts
     ]
     assert min(contrast) < 0.6

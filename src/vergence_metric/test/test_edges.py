@@ -4,10 +4,10 @@ import pytest
 from numpy.typing import NDArray
 
 from vergence_metric.edges.edges import ImageShapeError, detect_edges, to_grey
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.parameters import EdgeParameters
 from vergence_rig.parameters import ParameterError
 
-AUTO = EdgeMetricParameters()
+AUTO = EdgeParameters()
 
 
 def texture(seed: int = 0) -> NDArray[np.float64]:
@@ -34,7 +34,7 @@ def test_automatic_thresholds_follow_the_exposure() -> None:
     bright, dark = detect_edges(as_image(texture()), AUTO), detect_edges(as_image(20.0 + 0.5 * texture()), AUTO)
     assert dark.high == pytest.approx(0.5 * bright.high, rel=0.05)
     assert dark.count == pytest.approx(bright.count, rel=0.1)
-    fixed = EdgeMetricParameters(edge_method="fixed", canny_low=0.5 * bright.high, canny_high=bright.high)
+    fixed = EdgeParameters(threshold_mode="fixed", canny_low=0.5 * bright.high, canny_high=bright.high)
     assert detect_edges(as_image(20.0 + 0.5 * texture()), fixed).count < 0.7 * bright.count
 
 
@@ -44,12 +44,12 @@ def test_a_blank_wall_with_sensor_noise_has_no_edges() -> None:
 
 
 def test_fixed_thresholds_are_used_as_given() -> None:
-    edges = detect_edges(as_image(texture()), EdgeMetricParameters(edge_method="fixed", canny_low=11, canny_high=33))
+    edges = detect_edges(as_image(texture()), EdgeParameters(threshold_mode="fixed", canny_low=11, canny_high=33))
     assert (edges.low, edges.high) == (11.0, 33.0)
 
 
 def test_no_blur_is_allowed() -> None:
-    sharp = detect_edges(as_image(texture()), EdgeMetricParameters(blur_sigma_px=0.0))
+    sharp = detect_edges(as_image(texture()), EdgeParameters(blur_sigma_px=0.0))
     assert sharp.count > 0
 
 
@@ -78,8 +78,14 @@ def test_colour_is_refused_where_grey_is_meant() -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("windows_px", ()), ("windows_px", (50, 50)), ("windows_px", (0,)), ("canny_low", 60.0), ("edge_method", "otsu")],
+    [
+        ("windows_px", ()),
+        ("windows_px", (50, 50)),
+        ("windows_px", (0,)),
+        ("canny_low", 60.0),
+        ("threshold_mode", "otsu"),
+    ],
 )
 def test_parameters_that_cannot_be_are_named(name: str, value: object) -> None:
     with pytest.raises(ParameterError, match=name):
-        EdgeMetricParameters.from_mapping({name: value})
+        EdgeParameters.from_mapping({name: value})

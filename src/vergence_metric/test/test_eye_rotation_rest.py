@@ -1,4 +1,4 @@
-"""When pairs are looked at: two in a row at the wanted rate, of eyes and a head at rest."""
+"""Which pairs are measured: two in a row at the wanted rate, of eyes and a head at rest."""
 
 import math
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence_metric.eye_rotation.encoder import EyeRotationStatus, VisualEncoder
-from vergence_metric.eye_rotation.pair_choice import PairChoice
-from vergence_metric.eye_rotation.parameters import EncoderParameters
+from vergence_metric.eye_rotation.pair_selection import PairSelection
+from vergence_metric.eye_rotation.parameters import EncoderParameters, RestParameters
 from vergence_metric.eye_rotation.resting_pairs import measure_pair
 from vergence_metric.pairs.pairing import Pair
 from vergence_rig.camera import CameraModel
@@ -24,11 +24,11 @@ MODELS = (CameraModel(RIG.left_camera), CameraModel(RIG.right_camera))
 
 
 def chosen(stamps_ms: list[float], rate_hz: float) -> list[tuple[int, int]]:
-    choice: PairChoice[int] = PairChoice(rate_hz)
+    selection: PairSelection[int] = PairSelection(rate_hz)
     found = []
     for stamp_ns in (round(value * MS) for value in stamps_ms):
-        if choice.wants(stamp_ns):
-            two = choice.take(stamp_ns, stamp_ns)
+        if selection.is_due(stamp_ns):
+            two = selection.add(stamp_ns, stamp_ns)
             if two is not None:
                 found.append(two)
     return found
@@ -83,11 +83,11 @@ def joints(pan_at: dict[int, float]) -> JointHistory:
 RESTING = dict.fromkeys(range(0, 1001, 20), 0.1)
 
 
-def status(history: JointHistory, shift_px: int = 0, skew_ms: int = 7, parameters: EncoderParameters | None = None):
-    encoder = VisualEncoder(parameters or EncoderParameters(), RIG)
+def status(history: JointHistory, shift_px: int = 0, skew_ms: int = 7):
+    encoder = VisualEncoder(EncoderParameters(), RIG)
     before = Pair(Frame(scene(0)), Frame(scene(0)), 867 * MS, (867 + skew_ms) * MS)
     pair = Pair(Frame(scene(shift_px)), Frame(scene(shift_px)), 900 * MS, (900 + skew_ms) * MS)
-    return measure_pair(encoder, before, pair, history, MODELS)
+    return measure_pair(encoder, RestParameters(), before, pair, history, MODELS)
 
 
 def test_resting_eyes_are_measured() -> None:
@@ -123,5 +123,5 @@ def test_without_joints_or_cameras_there_is_no_reading() -> None:
     assert status(joints({0: 0.1, 20: 0.1})).status is EyeRotationStatus.NO_JOINTS
     assert status(joints({890: 0.1, 910: 0.1})).status is EyeRotationStatus.MOVING
     pair = Pair(Frame(scene(0)), Frame(scene(0)), 900 * MS, 900 * MS)
-    reading = measure_pair(VisualEncoder(EncoderParameters(), RIG), pair, pair, joints(RESTING), None)
+    reading = measure_pair(VisualEncoder(EncoderParameters(), RIG), RestParameters(), pair, pair, joints(RESTING), None)
     assert reading.status is EyeRotationStatus.NO_CAMERA_INFO

@@ -61,7 +61,7 @@ def test_only_the_newest_of_those_that_wait_is_worked_on(work: Work) -> None:
     assert (work.worker.worked, work.worker.dropped) == (2, 2)
 
 
-def test_a_failure_is_told_and_the_next_item_worked_on(work: Work) -> None:
+def test_a_failure_is_reported_and_the_next_item_processed(work: Work) -> None:
     work.begin(-5)
     work.step()
     assert [str(error) for error in work.errors] == ["-5"]

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from vergence_metric.disparity import Disparity, DisparityStatus
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric
 from vergence_metric.measurement.overlay import BOTH_BGR, LEFT_BGR, RIGHT_BGR, draw_overlay, overlay_lines
 
@@ -18,7 +18,7 @@ def box(x: int) -> np.ndarray:
 
 def drawn(left: np.ndarray, right: np.ndarray, disparity: Disparity = NONE) -> np.ndarray:
     # a window that leaves the edges free of its frame
-    result = EdgeMetric(EdgeMetricParameters(windows_px=(200,))).measure(left, right)
+    result = EdgeMetric(EdgeParameters(windows_px=(200,))).measure(left, right)
     return draw_overlay(left, result, disparity)
 
 
@@ -58,7 +58,7 @@ def test_the_disparity_is_an_arrow_only_where_there_is_one() -> None:
 
 @pytest.mark.parametrize(("disparity", "first"), [(GOOD, "error +12.0 px, 97% sure"), (NONE, "error unknown: blank")])
 def test_lines_tell_the_error_and_every_window(disparity: Disparity, first: str) -> None:
-    result = EdgeMetric(EdgeMetricParameters(windows_px=(50, 200))).measure(box(140), box(148))
+    result = EdgeMetric(EdgeParameters(windows_px=(50, 200))).measure(box(140), box(148))
     lines = overlay_lines(result, disparity)
     assert lines[0] == first
     assert len(lines) == 3

@@ -1,4 +1,6 @@
 import math
+from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -6,7 +8,7 @@ import pytest
 
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.measurement.pair_measurement import PairMeasurement
-from vergence_metric.measurement.parameters import EdgeMetricNodeParameters
+from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import default_rig
@@ -23,12 +25,12 @@ def view(shift_px: int, height: int = 480, width: int = 640) -> np.ndarray:
 
 @pytest.fixture
 def measurement() -> PairMeasurement:
-    return PairMeasurement(EdgeMetricNodeParameters(), default_rig())
+    return PairMeasurement(PairMeasurementParameters(), default_rig())
 
 
 @pytest.fixture(scope="module")
 def pair() -> EdgeMetricResult:
-    return PairMeasurement(EdgeMetricNodeParameters(), default_rig()).edge(view(0), view(0))
+    return PairMeasurement(PairMeasurementParameters(), default_rig()).edge(view(0), view(0))
 
 
 def locked(measurement: PairMeasurement, pair: EdgeMetricResult, start_s: float) -> Track:
@@ -38,6 +40,11 @@ def locked(measurement: PairMeasurement, pair: EdgeMetricResult, start_s: float)
         if track.status is TrackStatus.OK:
             return track
     raise AssertionError(track)
+
+
+def change(measurement: PairMeasurement, group: str, **changes: Any) -> None:
+    before = measurement.parameters
+    measurement.set_parameters(replace(before, **{group: getattr(before, group).replaced(**changes)}))
 
 
 def test_one_pair_gives_metric_disparity_and_verdict(measurement: PairMeasurement) -> None:
@@ -55,13 +62,13 @@ def test_a_change_elsewhere_leaves_the_target_and_one_of_the_tracker_gives_a_new
     measurement: PairMeasurement, pair: EdgeMetricResult
 ) -> None:
     first = locked(measurement, pair, 0.0)
-    measurement.set_parameters(measurement.parameters.replaced(windows_px=(60,), pair_slop_s=0.01))
+    change(measurement, "edges", windows_px=(60,))
     assert measurement.edge(view(0), view(0)).windows_px.tolist() == [60]
     assert measurement.track(pair, 10.0, AT_REST, None).track_id == first.track_id
-    measurement.set_parameters(measurement.parameters.replaced(track_settle_s=0.05))
+    change(measurement, "tracker", settle_s=0.05)
     second = locked(measurement, pair, 20.0)
     assert second.track_id == first.track_id + 1
-    measurement.set_parameters(measurement.parameters.replaced(disparity_estimator="zncc"))
+    change(measurement, "disparity", estimator="zncc")
     assert measurement.disparity(pair).estimator == "zncc"
     assert locked(measurement, pair, 30.0).track_id == second.track_id + 1
 
@@ -74,4 +81,10 @@ def test_without_joints_or_a_fitting_camera_there_is_no_track_but_a_reason(
     assert math.isnan(track.disparity_px)
     small = measurement.edge(view(0, 120, 160), view(0, 120, 160))
     track = measurement.track(small, 0.0, AT_REST, None)
-    assert (track.status, track.reason) == (TrackStatus.UNLOCKED, "no camera is described for images of 160x120")
+    assert (track.status, track.reason) == (TrackStatus.UNLOCKED, "no calibration for 160x120 images")
+
+
+def test_thresholds_of_verged_apply_from_the_next_pair_on(measurement: PairMeasurement, pair: EdgeMetricResult) -> None:
+    assert measurement.verged(pair, 1.5, 0.9)
+    change(measurement, "verged", enter_px=1.0)
+    assert not measurement.verged(pair, 1.5, 0.9)

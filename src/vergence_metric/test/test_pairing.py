@@ -18,7 +18,7 @@ PERIOD_NS = 33_333_333
 
 
 def pairer(slop_ms: float = 20.0, wait_periods: float = 1.0, queue: int = 16) -> StereoPairer[int]:
-    return StereoPairer(PairingParameters(pair_slop_s=slop_ms * 1e-3, pair_wait_periods=wait_periods, pair_queue=queue))
+    return StereoPairer(PairingParameters(slop_s=slop_ms * 1e-3, wait_periods=wait_periods, queue=queue))
 
 
 def fed(subject: StereoPairer[int], arrivals: list[tuple[int, int]], now_ns: int = 0) -> list[Pair[int]]:
@@ -127,7 +127,7 @@ def test_the_nearer_later_frame_wins() -> None:
 
 
 @pytest.mark.parametrize(("skew_ms", "waits"), [(5.0, False), (14.0, False), (16.5, True)])
-def test_a_known_period_lets_a_close_pair_out_at_once_and_makes_a_far_one_wait(skew_ms: float, waits: bool) -> None:
+def test_a_known_period_releases_a_close_pair_at_once_and_makes_a_far_one_wait(skew_ms: float, waits: bool) -> None:
     subject, at_once = pairer(), []
     for i in range(60):
         jitter_ns = (i % 3 - 1) * MS // 2
@@ -138,7 +138,7 @@ def test_a_known_period_lets_a_close_pair_out_at_once_and_makes_a_far_one_wait(s
     assert (subject.deadline_ns is not None) is waits
 
 
-def test_a_pair_that_waits_is_given_out_at_its_deadline() -> None:
+def test_a_pair_that_waits_is_released_at_its_deadline() -> None:
     subject = pairer(wait_periods=0.5)
     for i in range(5):
         subject.add(LEFT, i * PERIOD_NS, i, i * PERIOD_NS)
@@ -200,7 +200,9 @@ def test_says_why_it_never_pairs() -> None:
     subject = pairer(slop_ms=10.0)
     fed(subject, [(side, i * PERIOD_NS + side * 14 * MS) for i in range(20) for side in (LEFT, RIGHT)])
     assert subject.statistics.pairs == 0
-    assert subject.statistics.complaint(0.01) == "never within slop: median skew 14 ms, pair_slop_s allows 10 ms"
+    assert (
+        subject.statistics.complaint(0.01) == "no pair since the start: median skew is 14 ms, pair.slop_s allows 10 ms"
+    )
 
 
 def test_says_nothing_while_it_pairs_or_one_eye_is_silent() -> None:
@@ -217,7 +219,9 @@ def test_a_skew_of_ten_seconds_is_named_too() -> None:
     fed(subject, [(side, i * PERIOD_NS + side * 10 * JUMP_NS) for i in range(20) for side in (LEFT, RIGHT)])
     complaint = subject.statistics.complaint(0.02)
     assert complaint is not None
-    assert re.fullmatch(r"never within slop: median skew (9[4-9]\d\d|10000) ms, pair_slop_s allows 20 ms", complaint)
+    assert re.fullmatch(
+        r"no pair since the start: median skew is (9[4-9]\d\d|10000) ms, pair.slop_s allows 20 ms", complaint
+    )
 
 
 def test_interval_ignores_loss_and_guards_against_jitter() -> None:

@@ -10,46 +10,48 @@ def thirty_hz(seconds: float = 2.0) -> StreamHealth:
     return health
 
 
-def test_a_healthy_stream_tells_its_rate_age_and_size() -> None:
-    found = thirty_hz().finding(102.0, publishers=1, stalled_after_s=1.0)
-    assert found.fine
-    assert found.sentence == "left/image_raw: 30.0 Hz"
-    assert found.values["rate_hz"] == pytest.approx(30.0)
-    assert found.values["age_median_ms"] == pytest.approx(12.0)
-    assert found.values["size_px"] == "640x480"
+def test_a_healthy_stream_reports_its_rate_age_and_size() -> None:
+    status = thirty_hz().status(102.0, publishers=1, stalled_after_s=1.0)
+    assert status.ok
+    assert status.message == "left/image_raw: 30.0 Hz"
+    assert status.values["rate_hz"] == pytest.approx(30.0)
+    assert status.values["age_median_ms"] == pytest.approx(12.0)
+    assert status.values["size_px"] == "640x480"
 
 
-def test_silence_is_told_with_its_length_and_whether_anybody_publishes() -> None:
+def test_silence_is_reported_with_its_length_and_whether_there_is_a_publisher() -> None:
     health = thirty_hz()
     last_s = 100.0 + 59 / 30
-    assert health.finding(last_s + 1.0, 1, 1.0).fine
-    assert health.finding(last_s + 1.2, 1, 1.0).sentence == "left/image_raw: no image for 1.2 s"
-    assert health.finding(last_s + 1.2, 0, 1.0).sentence == "left/image_raw: no image for 1.2 s (nobody publishes it)"
+    assert health.status(last_s + 1.0, 1, 1.0).ok
+    assert health.status(last_s + 1.2, 1, 1.0).message == "left/image_raw: no image for 1.2 s"
+    assert (
+        health.status(last_s + 1.2, 0, 1.0).message == "left/image_raw: no image for 1.2 s (the topic has no publisher)"
+    )
 
 
 def test_a_stream_that_never_began_is_waited_for_and_then_named() -> None:
     health = StreamHealth("right/image_raw", 100.0)
-    assert health.finding(100.5, 0, 1.0).fine
-    found = health.finding(103.0, 0, 1.0)
-    assert not found.fine
-    assert found.sentence == "right/image_raw: no image since the start, 3.0 s (nobody publishes it)"
+    assert health.status(100.5, 0, 1.0).ok
+    status = health.status(103.0, 0, 1.0)
+    assert not status.ok
+    assert status.message == "right/image_raw: no image since the start, 3.0 s (the topic has no publisher)"
 
 
-def test_a_refusal_is_told_until_a_good_image_comes() -> None:
+def test_a_refusal_is_reported_until_a_good_image_comes() -> None:
     health = thirty_hz()
     health.refuse(102.0, "encoding is 'x'")
-    found = health.finding(102.1, 1, 1.0)
-    assert (found.fine, found.sentence) == (False, "left/image_raw: encoding is 'x'")
+    status = health.status(102.1, 1, 1.0)
+    assert (status.ok, status.message) == (False, "left/image_raw: encoding is 'x'")
     health.accept(102.1, 0.01, (640, 480))
-    found = health.finding(102.2, 1, 1.0)
-    assert found.fine
-    assert found.values["refused"] == 1
-    assert found.values["received"] == 62
+    status = health.status(102.2, 1, 1.0)
+    assert status.ok
+    assert status.values["refused"] == 1
+    assert status.values["received"] == 62
 
 
 def test_two_publishers_are_named() -> None:
-    found = thirty_hz().finding(102.0, 2, 1.0)
-    assert (found.fine, found.sentence) == (False, "left/image_raw: 2 publishers, there must be one")
+    status = thirty_hz().status(102.0, 2, 1.0)
+    assert (status.ok, status.message) == (False, "left/image_raw must have one publisher: got 2")
 
 
 def test_the_rate_forgets_what_was_before_a_gap() -> None:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from vergence_metric.disparity import make_estimator
-from vergence_metric.disparity.parameters import DisparityParameters, TrackerParameters
+from vergence_metric.disparity.parameters import DisparityParameters
+from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.track import TrackStatus
 from vergence_metric.tracking.tracker import TargetTracker
 from vergence_rig.camera import CameraModel
@@ -60,8 +61,8 @@ class Stage:
         self.frame, self.rng = 0, np.random.default_rng(0)
         self.tracks, self.errors = [], []
 
-    def show(self, target_m, eyes, occluder_m=None, covered=(), slant_rad=0.0, told=None):
-        """Show a frame; `told` is where the joints say that the eyes are, if that is not where they are."""
+    def show(self, target_m, eyes, occluder_m=None, covered=(), slant_rad=0.0, joints=None):
+        """Show a frame; `joints` are the reported angles, if they differ from the true ones."""
         images = []
         for left in (True, False):
             image = np.full((480, 640), 90, np.float32)
@@ -73,7 +74,7 @@ class Stage:
                 image[:] = 15
             image += 2.0 * cv2.randn(np.empty((480, 640), np.float32), 0, 1)
             images.append(np.clip(image, 0, 255).astype(np.uint8))
-        track = self.tracker.update(images[0], images[1], self.frame * FRAME_S, told or eyes)
+        track = self.tracker.update(images[0], images[1], self.frame * FRAME_S, joints or eyes)
         true_left, true_right = pixel(target_m, True, eyes), pixel(target_m, False, eyes)
         self.tracks.append(track)
         self.errors.append(
@@ -161,7 +162,7 @@ def test_it_follows_in_depth(stage):
     assert track.extent_px[0] == pytest.approx(width_px * 0.5 / 0.85, rel=0.15)
 
 
-def test_a_blink_of_a_second_is_survived_and_told(stage):
+def test_a_blink_of_a_second_is_survived_and_reported(stage):
     target = (0.8, 0.0, 0.0)
     first = stage.lock(target, gaze(target))
     for _ in range(30):
@@ -178,14 +179,14 @@ def test_a_blink_of_a_second_is_survived_and_told(stage):
 
 @pytest.mark.parametrize("moves_m", [0.0, 0.004])
 def test_joints_that_were_wrong_once_do_not_send_it_away(stage, moves_m):
-    """Servos without feedback are not where they say while they turn, and their pictures smear."""
+    """Servos without feedback are off their reported angles while they move, and their images blur."""
     place = np.array([0.8, 0.0, 0.0])
     first = stage.lock(place, eyes := gaze(place))
     step = np.array([0.0, moves_m, 0.0])
     for _ in range(8):
         stage.show(place := place + step, eyes)
     wrong = EyeAngles(eyes.pan_left_rad + 0.04, eyes.pan_right_rad + 0.04, 0.0)
-    stage.show(place := place + step, eyes, told=wrong)
+    stage.show(place := place + step, eyes, joints=wrong)
     for _ in range(12):
         stage.show(place := place + step, eyes, covered=("left", "right"))
     for _ in range(3):
@@ -270,7 +271,7 @@ def test_a_saccade_towards_the_target_keeps_it(stage):
 def test_a_target_that_stays_away_is_given_up_until_the_next_saccade():
     stage = Stage()
     stage.tracker = TargetTracker(
-        TrackerParameters(track_give_up_s=0.3), make_estimator(DisparityParameters()), CAMERA, CAMERA, RIG.baseline_m
+        TrackerParameters(give_up_s=0.3), make_estimator(DisparityParameters()), CAMERA, CAMERA, RIG.baseline_m
     )
     target = (0.8, 0.0, 0.0)
     stage.lock(target, gaze(target))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from vergence_metric.eye_rotation.encoder import EyeRotationReading, EyeRotationStatus, VisualEncoder
 from vergence_metric.eye_rotation.epipolar_view import epipolar_view
-from vergence_metric.eye_rotation.parameters import EncoderParameters
+from vergence_metric.eye_rotation.parameters import AcceptanceParameters, EncoderParameters, MatchingParameters
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, rotation_rig_from_eye
 from vergence_rig.rig import default_rig
@@ -148,7 +148,7 @@ def mirrored() -> np.ndarray:
     ],
     ids=["blank", "noise", "black", "unrelated", "blurred"],
 )
-def test_what_tells_nothing_is_refused_with_a_reason(right: np.ndarray) -> None:
+def test_images_without_matches_are_refused_with_a_reason(right: np.ndarray) -> None:
     reading = VisualEncoder(EncoderParameters(), RIG).measure(
         view(True, -0.03, 2.0), right, EyeAngles(-0.03, 0.03, 0.0), MODELS
     )
@@ -169,7 +169,9 @@ def test_both_images_blank_is_refused() -> None:
 
 
 def test_a_vergence_that_servos_and_mounts_cannot_have_is_contradictory() -> None:
-    encoder = VisualEncoder(EncoderParameters(mount_tolerance_rad=0.004), RIG.with_servos(IDEAL))
+    encoder = VisualEncoder(
+        EncoderParameters(acceptance=AcceptanceParameters(mount_tolerance_rad=0.004)), RIG.with_servos(IDEAL)
+    )
     reading = encoder.measure(view(True, -0.03), view(False, 0.03), EyeAngles(-0.03, 0.022, 0.0), MODELS)
     assert reading.status is EyeRotationStatus.CONTRADICTORY
     assert "0.46 degrees" in reading.reason
@@ -185,7 +187,11 @@ def test_features_in_one_corner_are_too_uncertain() -> None:
     left, right = view(True, -0.03), view(False, 0.03)
     covered = np.zeros_like(left)
     covered[180:300, 220:420] = 1
-    encoder = VisualEncoder(EncoderParameters(features=4000, least_inliers=30, most_sigma_rad=0.002), RIG)
+    parameters = EncoderParameters(
+        matching=MatchingParameters(features=4000),
+        acceptance=AcceptanceParameters(min_inliers=30, max_sigma_rad=0.002),
+    )
+    encoder = VisualEncoder(parameters, RIG)
     reading = encoder.measure(left * covered, right * covered, EyeAngles(-0.03, 0.03, 0.0), MODELS)
     assert reading.status in (EyeRotationStatus.UNCERTAIN, EyeRotationStatus.FEW_FEATURES)
 

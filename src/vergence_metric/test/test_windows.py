@@ -32,5 +32,5 @@ def test_windows_keep_the_order_asked_for() -> None:
 
 @pytest.mark.parametrize(("size", "height", "width"), [(0, 10, 10), (5, 0, 10), (5, 10, 0), (-3, 10, 10)])
 def test_no_extent_is_an_error_that_names_the_values(size: int, height: int, width: int) -> None:
-    with pytest.raises(WindowError, match=f"window of {size} px in an image of {width}x{height}"):
+    with pytest.raises(WindowError, match=f"got {size} px in {width}x{height}"):
         centre_window(size, height, width)

@@ -1,1 +1,1 @@
-"""Vertical offset and roll between the eyes, measured and taken out."""
+"""Vertical offset and roll between the eyes, estimated and removed from the right image."""

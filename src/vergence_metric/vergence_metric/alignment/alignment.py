@@ -1,7 +1,7 @@
-"""Taking vertical offset and roll between the eyes out of the right image before anything is compared.
+"""Removal of vertical offset and roll between the eyes from the right image, before the images are compared.
 
-Thirteen pixels of vertical offset hide vergence altogether. The offset and roll come from the mounts, so they are taken
-from calibration, or estimated from the pairs and filtered over time.
+Thirteen pixels of vertical offset hide vergence completely. Offset and roll come from the mounts: they are calibrated,
+or estimated from the pairs and filtered over time.
 """
 
 import math
@@ -9,24 +9,26 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from vergence_metric.alignment.misalignment import Misalignment, estimate_misalignment
-from vergence_metric.edges.edges import Grey
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.alignment.parameters import AlignmentParameters
 
-_EAGER_PAIRS = 5  # at first every pair is looked at
+_INITIAL_PAIRS = 5  # estimates on each of the first pairs, at once
 _NEGLIGIBLE_PX = 0.05
 _GATE_SIGMAS, _GATE_PX = 4.0, 1.0
 _REJECTIONS_TO_RESTART = 5
 
+Grey = NDArray[np.uint8]
+
 
 @dataclass(frozen=True)
 class Alignment:
-    """What is taken out of the right image.
+    """Vertical offset and roll that are removed from the right image.
 
     `vertical_px` is y_left - y_right at the centre, `roll_rad` the right image's rotation, clockwise in the image
-    positive. `bounded`: the estimate was larger than allowed and was clipped. `estimated` is False where mode is auto
-    and no pair has shown anything yet.
+    positive. `bounded`: the estimate exceeded its bound and was clipped. `estimated` is False in mode auto before the
+    first estimate.
     """
 
     mode: str
@@ -38,8 +40,8 @@ class Alignment:
     def apply(self, right: Grey) -> Grey:
         """Return the (h, w) `right` image as an eye without offset and roll would see it.
 
-        The image's centre keeps its column, so that horizontal disparity there is not disturbed. Where there is next to
-        nothing to take out, the image is returned as it is, not copied.
+        The image's centre keeps its column, so that horizontal disparity there is unchanged. With negligible offset and
+        roll the image itself is returned, not a copy.
         """
         height, width = right.shape
         if abs(self.vertical_px) < _NEGLIGIBLE_PX and abs(self.roll_rad) * width / 2.0 < _NEGLIGIBLE_PX:
@@ -58,7 +60,7 @@ class Alignment:
         )
 
     def unaligned(self, x_px: float, y_px: float, width_px: int, height_px: int) -> tuple[float, float]:
-        """Return where a point of the aligned right image lies in the right image as it was taken [px]."""
+        """Return the position in the original right image of a point of the aligned one [px]."""
         cos, sin = math.cos(self.roll_rad), math.sin(self.roll_rad)
         centre_x, centre_y = (width_px - 1) / 2.0, (height_px - 1) / 2.0
         dx, dy = x_px - centre_x, y_px - centre_y
@@ -66,89 +68,91 @@ class Alignment:
 
 
 class Aligner:
-    """Tells the alignment of pair after pair, as the parameters ask: none, calibrated, or auto.
+    """Determines the alignment of successive pairs by `mode`: none, calibrated, or auto.
 
-    Auto estimates offset and roll from every one of the first few pairs, then from one in `align_every_pairs`, and
-    filters each with a scalar Kalman filter. An estimate far from what is known is left out, unless several in a row
-    are. The first few count for their own pair; the later ones take as long as the rest of a pair's work, so that they
-    are put off: to `settle`, for which there is time once the pair's figures are out, or to the next pair.
+    Auto estimates offset and roll from each of the first five pairs, then from one pair in `every_pairs`, and filters
+    both with scalar Kalman filters. An estimate outside the gate is rejected, unless several in a row are. The first
+    estimates apply to their own pair. Later ones take as long as the rest of a pair's work and are deferred: to
+    `update_alignment`, to be called once the pair's results are published, or to the next pair.
     """
 
-    def __init__(self, parameters: EdgeMetricParameters) -> None:
+    def __init__(self, parameters: AlignmentParameters) -> None:
         self._parameters = parameters
         self._pairs = 0
         self._rejected = 0
         self._estimated = False
-        self._vertical, self._roll = _ignorance()
-        self._due: tuple[Grey, Grey] | None = None
+        self._vertical, self._roll = _prior()
+        self._deferred: tuple[Grey, Grey] | None = None
 
     def update(self, left: Grey, right: Grey) -> Alignment:
         """Return the alignment of this pair of (h, w) uint8 images, given all that came before it."""
         p = self._parameters
-        if p.align == "none":
+        if p.mode == "none":
             return Alignment("none")
-        if p.align == "calibrated":
-            return Alignment("calibrated", p.align_vertical_px, math.radians(p.align_roll_deg))
-        self.settle()
-        if self._pairs < _EAGER_PAIRS:
+        if p.mode == "calibrated":
+            return Alignment("calibrated", p.vertical_px, p.roll_rad)
+        self.update_alignment()
+        if self._pairs < _INITIAL_PAIRS:
             self._estimate(left, right)
-        elif self._pairs % p.align_every_pairs == 0:
-            self._due = left, right
+        elif self._pairs % p.every_pairs == 0:
+            self._deferred = left, right
         self._pairs += 1
-        most_px, most_rad = p.align_max_vertical_px, math.radians(p.align_max_roll_deg)
-        vertical = min(max(self._vertical.value, -most_px), most_px)
-        roll = min(max(self._roll.value, -most_rad), most_rad)
+        max_px, max_rad = p.max_vertical_px, p.max_roll_rad
+        vertical = min(max(self._vertical.value, -max_px), max_px)
+        roll = min(max(self._roll.value, -max_rad), max_rad)
         bounded = vertical != self._vertical.value or roll != self._roll.value
         return Alignment("auto", vertical, roll, bounded, self._estimated)
 
-    def settle(self) -> None:
-        """Make the estimate that was put off, if any."""
-        if self._due is not None:
-            due, self._due = self._due, None
-            self._estimate(*due)
+    def update_alignment(self) -> None:
+        """Compute the deferred estimate, if any."""
+        if self._deferred is not None:
+            deferred, self._deferred = self._deferred, None
+            self._estimate(*deferred)
 
     def _estimate(self, left: Grey, right: Grey) -> None:
         p = self._parameters
-        seen = estimate_misalignment(
+        estimate = estimate_misalignment(
             left,
             right,
-            search_horizontal_px=p.align_search_px,
-            search_vertical_px=math.ceil(p.align_max_vertical_px * 1.5),
+            search_horizontal_px=p.search_px,
+            search_vertical_px=math.ceil(p.max_vertical_px * 1.5),
         )
-        if seen is not None:
-            self._take(seen)
+        if estimate is not None:
+            self._filter(estimate)
 
-    def _take(self, seen: Misalignment) -> None:
-        surprising = self._vertical.surprising(seen.vertical_px, seen.vertical_sigma_px)
-        if surprising and self._rejected + 1 < _REJECTIONS_TO_RESTART:
+    def _filter(self, estimate: Misalignment) -> None:
+        outlier = self._vertical.is_outlier(estimate.vertical_px, estimate.vertical_sigma_px)
+        if outlier and self._rejected + 1 < _REJECTIONS_TO_RESTART:
             self._rejected += 1
             return
-        if surprising:
-            self._vertical, self._roll = _ignorance()
+        if outlier:
+            self._vertical, self._roll = _prior()
         self._rejected, self._estimated = 0, True
-        self._vertical.take(seen.vertical_px, seen.vertical_sigma_px)
-        self._roll.take(seen.roll_rad, seen.roll_sigma_rad)
+        self._vertical.update(estimate.vertical_px, estimate.vertical_sigma_px)
+        self._roll.update(estimate.roll_rad, estimate.roll_sigma_rad)
 
 
-class _Filtered:
-    """A slowly drifting value, by the estimates of it; `sigma` is what is known before the first."""
+class _ScalarKalmanFilter:
+    """Estimates a slowly drifting value; `sigma` is its prior standard deviation, `drift` that of a step."""
 
     def __init__(self, sigma: float, drift: float) -> None:
         self.value = 0.0
         self._variance, self._drift = sigma**2, drift**2
 
-    def surprising(self, seen: float, sigma: float) -> bool:
-        """Tell whether an estimate is hardly one of the same value."""
-        return abs(seen - self.value) > _GATE_SIGMAS * math.sqrt(self._variance + sigma**2) + _GATE_PX
+    def is_outlier(self, measured: float, sigma: float) -> bool:
+        """Return whether a measurement lies outside the gate."""
+        return abs(measured - self.value) > _GATE_SIGMAS * math.sqrt(self._variance + sigma**2) + _GATE_PX
 
-    def take(self, seen: float, sigma: float) -> None:
-        """Fold in an estimate with its standard deviation."""
+    def update(self, measured: float, sigma: float) -> None:
+        """Update with a measurement and its standard deviation."""
         self._variance += self._drift
         gain = self._variance / (self._variance + sigma**2)
-        self.value += gain * (seen - self.value)
+        self.value += gain * (measured - self.value)
         self._variance *= 1.0 - gain
 
 
-def _ignorance() -> tuple[_Filtered, _Filtered]:
-    """Return vertical offset [px] and roll [rad] as they are before anything is seen."""
-    return _Filtered(sigma=20.0, drift=0.1), _Filtered(sigma=math.radians(1.5), drift=math.radians(0.02))
+def _prior() -> tuple[_ScalarKalmanFilter, _ScalarKalmanFilter]:
+    """Return the filters of vertical offset [px] and roll [rad] before the first estimate."""
+    return _ScalarKalmanFilter(sigma=20.0, drift=0.1), _ScalarKalmanFilter(
+        sigma=math.radians(1.5), drift=math.radians(0.02)
+    )

@@ -1,12 +1,12 @@
-"""Vertical offset and roll between two eyes, estimated from one pair of images whatever its depths.
+"""Vertical offset and roll between two eyes, estimated from one pair of images of any depths.
 
-Small patches with structure in both directions are found again in the other image, wherever they lie horizontally. How
-far each lies higher or lower is, in pixels from the image centre,
+Small patches with structure in both directions are matched in the other image, at any horizontal position. Their
+vertical disparity is, in pixels from the image centre,
 
     y_left - y_right = vertical - roll * x_right + c * y + k * x_right * y,
 
 where c (one eye is nearer to the scene) and k (converged eyes see keystones) belong to the gaze, not to the mounts, and
-are estimated only to be kept out of the other two. Wrong matches are left out by random sampling (MSAC).
+are estimated only to separate them from the other two. Wrong matches are rejected by random sampling (MSAC).
 """
 
 import math
@@ -16,32 +16,32 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.edges.edges import Grey
+Grey = NDArray[np.uint8]
 
-_COARSE = 4  # patches are first found at a quarter of the size
+_COARSE = 4  # patches are first matched at a quarter of the size
 _COARSE_PATCH_PX = 10  # half sides
 _FINE_PATCH_PX = 10
 _FINE_SEARCH_PX = 5
 _PATCHES = 72
-_MINIMUM_LIKENESS = 0.7
+_MIN_SIMILARITY = 0.7
 _UNIQUENESS = 0.9
 _INLIER_PX = 1.5
-_MINIMUM_INLIERS = 8
-_MINIMUM_INLIER_SHARE = 0.4
-_LARGEST_SCALE, _LARGEST_KEYSTONE = 0.15, 0.15  # of c, and of k times half the image's width
+_MIN_INLIERS = 8
+_MIN_INLIER_SHARE = 0.4
+_MAX_SCALE, _MAX_KEYSTONE = 0.15, 0.15  # of c, and of k times half the image's width
 _SAMPLES = 300
 _NOISE_PX = 0.5
-# what is believed before anything is seen, as standard deviations: offset [px], and of roll, c and k their effect at
-# half the image's width, as a share of it
+# standard deviations of the prior: offset [px], and of roll, c and k their effect at half the image's width, as a
+# share of it
 _PRIOR_OFFSET_PX, _PRIOR_SHARES = 100.0, (0.02, 0.04, 0.04)
 
 
 @dataclass(frozen=True)
 class Misalignment:
-    """How the right image lies against the left one.
+    """Vertical offset and roll of the right image against the left one.
 
     `vertical_px` is y_left - y_right at the centre of the right image, `roll_rad` its rotation, clockwise positive;
-    `..._sigma` are their standard deviations. `matches` patches were found again, of which `inliers` agree.
+    `..._sigma` are their standard deviations. Of `matches` matched patches `inliers` agree.
     """
 
     vertical_px: float
@@ -55,16 +55,16 @@ class Misalignment:
 def estimate_misalignment(
     left: Grey, right: Grey, *, search_horizontal_px: int, search_vertical_px: int
 ) -> Misalignment | None:
-    """Return the misalignment of two (h, w) uint8 images, None where too little of one is found again in the other.
+    """Return the misalignment of two (h, w) uint8 images, None where too few patches match.
 
-    Patches are looked for to `search_horizontal_px` on both sides and to `search_vertical_px` up and down.
+    Patches are searched to `search_horizontal_px` on both sides and to `search_vertical_px` up and down.
     """
     found = _matches(left, right, search_horizontal_px, search_vertical_px)
     half_width = left.shape[1] / 2.0
     x = (found[:, 0] - (left.shape[1] - 1) / 2.0) / half_width
     y = (found[:, 1] - (left.shape[0] - 1) / 2.0) / half_width
     design, offset = np.column_stack([np.ones_like(x), x, y, x * y]), found[:, 2]
-    needed = max(_MINIMUM_INLIERS, _MINIMUM_INLIER_SHARE * len(offset))
+    needed = max(_MIN_INLIERS, _MIN_INLIER_SHARE * len(offset))
     if len(offset) < needed:
         return None
     inlier = _consensus(design, offset, half_width)
@@ -88,7 +88,7 @@ def estimate_misalignment(
 
 
 def _solve(design: NDArray[np.float64], offset: NDArray[np.float64], prior: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the least-squares model, held near zero by `prior` where the matches do not say."""
+    """Return the least-squares model, regularised by `prior` where the matches do not determine it."""
     solution, *_ = np.linalg.lstsq(np.vstack([design, prior]), np.append(offset, np.zeros(len(prior))), rcond=None)
     return solution
 
@@ -97,12 +97,10 @@ def _consensus(design: NDArray[np.float64], offset: NDArray[np.float64], half_wi
     """Return which matches agree with the best of many models drawn through four of them each."""
     draws = np.random.default_rng(0).permuted(np.tile(np.arange(len(offset)), (_SAMPLES, 1)), axis=1)[:, :4]
     systems = design[draws]
-    sound = np.abs(np.linalg.det(systems)) > 1e-4
-    models = np.linalg.solve(systems[sound], offset[draws[sound]][..., None])[..., 0]
-    possible = (np.abs(models[:, 2]) < _LARGEST_SCALE * half_width) & (
-        np.abs(models[:, 3]) < _LARGEST_KEYSTONE * half_width
-    )
-    # the simplest models take part too: an offset alone, as each match has it
+    regular = np.abs(np.linalg.det(systems)) > 1e-4
+    models = np.linalg.solve(systems[regular], offset[draws[regular]][..., None])[..., 0]
+    possible = (np.abs(models[:, 2]) < _MAX_SCALE * half_width) & (np.abs(models[:, 3]) < _MAX_KEYSTONE * half_width)
+    # the simplest models are candidates too: the vertical offset of each match alone
     flat = np.column_stack([offset, np.zeros((len(offset), 3))])
     models = np.concatenate([models[possible], flat])
     squared = (models @ design.T - offset) ** 2
@@ -111,7 +109,7 @@ def _consensus(design: NDArray[np.float64], offset: NDArray[np.float64], half_wi
 
 
 def _matches(left: Grey, right: Grey, horizontal_px: int, vertical_px: int) -> NDArray[np.float64]:
-    """Return x_right, y_right and y_left - y_right [px] of each patch found again, (n, 3)."""
+    """Return x_right, y_right and y_left - y_right [px] of each matched patch, (n, 3)."""
     size = (left.shape[1] // _COARSE, left.shape[0] // _COARSE)
     if min(size) < 4 * _COARSE_PATCH_PX:
         return np.empty((0, 3))
@@ -135,7 +133,7 @@ def _matches(left: Grey, right: Grey, horizontal_px: int, vertical_px: int) -> N
 def _find(
     left: Grey, right: Grey, x: int, y: int, half: int, guess: tuple[int, int], reach: tuple[int, int]
 ) -> tuple[float, float] | None:
-    """Return how far the patch of `left` about (x, y) is displaced in `right`, None if it is not found inside."""
+    """Return the displacement (x, y) in `right` of the patch of `left` about (x, y), None without a clear match."""
     height, width = left.shape
     if not (half <= x < width - half and half <= y < height - half):
         return None
@@ -145,22 +143,22 @@ def _find(
         return None
     patch = left[y - half : y + half + 1, x - half : x + half + 1]
     area = right[y_low - half : y_high + half + 1, x_low - half : x_high + half + 1]
-    likeness = cv2.matchTemplate(area, patch, cv2.TM_CCOEFF_NORMED)
-    _, best, _, (column, row) = cv2.minMaxLoc(likeness)
-    if best < _MINIMUM_LIKENESS or not (0 < column < likeness.shape[1] - 1 and 0 < row < likeness.shape[0] - 1):
+    similarity = cv2.matchTemplate(area, patch, cv2.TM_CCOEFF_NORMED)
+    _, best, _, (column, row) = cv2.minMaxLoc(similarity)
+    if best < _MIN_SIMILARITY or not (0 < column < similarity.shape[1] - 1 and 0 < row < similarity.shape[0] - 1):
         return None
-    if _rivalled(likeness, row, half):
+    if _is_ambiguous(similarity, row, half):
         return None
-    across, down = likeness[row, column - 1 : column + 2], likeness[row - 1 : row + 2, column]
+    across, down = similarity[row, column - 1 : column + 2], similarity[row - 1 : row + 2, column]
     return x_low + column + _vertex(across) - x, y_low + row + _vertex(down) - y
 
 
-def _rivalled(likeness: NDArray[np.float32], row: int, half: int) -> bool:
-    """Tell whether the patch is found about as well in rows where it cannot be the same."""
-    rivals = max(
-        likeness[: max(row - half // 2, 0)].max(initial=-1.0), likeness[row + half // 2 + 1 :].max(initial=-1.0)
+def _is_ambiguous(similarity: NDArray[np.float32], row: int, half: int) -> bool:
+    """Return whether the patch matches about as well in other rows, where it cannot be the same."""
+    other_rows = max(
+        similarity[: max(row - half // 2, 0)].max(initial=-1.0), similarity[row + half // 2 + 1 :].max(initial=-1.0)
     )
-    return bool(rivals > _UNIQUENESS * likeness[row].max())
+    return bool(other_rows > _UNIQUENESS * similarity[row].max())
 
 
 def _vertex(three: NDArray[np.float32]) -> float:

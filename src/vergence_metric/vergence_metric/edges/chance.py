@@ -1,8 +1,8 @@
-"""Chance level of the edge metric: what it would read if the two edge images had nothing to do with one another.
+"""Chance level of the edge metric: its value if the two edge images were unrelated.
 
-Were one image's edge pixels strewn evenly over the window, their mean distance to the other's edges would be the mean
-over all pixels of the window. It depends on how many edges there are and how they lie, not on vergence: a figure of
-6 px is good where chance is 20 px and worthless where it is 6.
+If one image's edge pixels were spread evenly over the window, their mean distance to the other's edges would be the
+mean over all pixels of the window. It depends on the number and arrangement of edges, not on vergence: a metric of 6 px
+is good where chance is 20 px and meaningless where it is 6.
 """
 
 from dataclasses import dataclass

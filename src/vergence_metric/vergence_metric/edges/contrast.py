@@ -6,7 +6,7 @@ at a few pixels. With n_k edge pixels of bin k in the window,
     contrast = mean of d_k over the window's edge pixels / (sum of n_k * mean of d_k over all its pixels / sum of n_k).
 
 The denominator is what the numerator would be at any unrelated alignment of the same two edge images, so that density,
-texture and exposure cancel. It judges, it does not guide: it is flat a few pixels away from vergence.
+texture and exposure cancel. It detects vergence but gives no direction: it is flat a few pixels away from vergence.
 """
 
 import math
@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from vergence_metric.edges.oriented_edges import OrientedField
 
-_LATTICE = 24  # points along a window's side that stand for all its pixels
+_LATTICE = 24  # points along a window's side that represent all its pixels
 
 
 @dataclass(frozen=True)
 class Contrasts:
-    """Contrast in each window, (n,) float64, windows sorted by size; NaN where there is nothing to judge."""
+    """Contrast in each window, (n,) float64, windows sorted by size; NaN where an image has no edge pixels."""
 
     left_to_right: NDArray[np.float64]
     right_to_left: NDArray[np.float64]
@@ -39,7 +39,7 @@ def contrasts(field: OrientedField, truncation_px: int) -> Contrasts:
     NaN in a window where either image has no edge pixel.
     """
     counts = [_counts(field, image) for image in (0, 1)]
-    judgeable = (counts[0].sum(axis=1) > 0) & (counts[1].sum(axis=1) > 0)
+    measurable = (counts[0].sum(axis=1) > 0) & (counts[1].sum(axis=1) > 0)
     ratios = []
     for direction in (0, 1):
         rings = field.images[direction].ring
@@ -47,17 +47,17 @@ def contrasts(field: OrientedField, truncation_px: int) -> Contrasts:
         total = np.bincount(rings, weights=distance, minlength=len(field.windows)).cumsum()
         everywhere = field.mean_distances_px(1 - direction, truncation_px, _LATTICE)
         chance = (counts[direction] * everywhere).sum(axis=1)
-        # chance is 0 only where every pixel is an edge pixel: nothing to tell apart
-        ratios.append(np.where(judgeable & (chance > 0.0), total / np.where(chance > 0.0, chance, 1.0), np.nan))
+        # chance is 0 only where every pixel is an edge pixel: no contrast defined
+        ratios.append(np.where(measurable & (chance > 0.0), total / np.where(chance > 0.0, chance, 1.0), np.nan))
     return Contrasts(*ratios)
 
 
 def foveal_contrast(field: OrientedField, truncation_px: int, sigma_px: float) -> float:
-    """Return the contrast of what the eyes are turned to: edge pixels weigh less with their distance from the centre.
+    """Return the contrast at the fovea: edge pixels weigh less with their distance from the image centre.
 
     A window with a soft border: a target that fills only the middle of the smallest window still decides. The weight is
     a Gaussian; chance is that of the smallest window which holds two standard deviations of it. Mean of both
-    directions, NaN where there is nothing to judge.
+    directions, NaN where an image has no edge pixels.
     """
     wide_enough = [i for i, window in enumerate(field.windows) if window.size_px >= 4.0 * sigma_px]
     window = wide_enough[0] if wide_enough else len(field.windows) - 1

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.edges.parameters import EdgeMetricParameters
+from vergence_metric.edges.parameters import EdgeParameters
 
 Grey = NDArray[np.uint8]
 
@@ -16,7 +16,7 @@ _SAMPLING = 4
 
 
 class ImageShapeError(ValueError):
-    """An image that is neither (h, w) nor (h, w, 3) uint8, or two that must be alike and are not."""
+    """An image that is neither (h, w) nor (h, w, 3) uint8, or two of different sizes."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Edges:
     """Edge pixels of one image with the gradient they were found in.
 
     `mask` (h, w) uint8 is 255 at edge pixels; `gradient_x`, `gradient_y` (h, w) int16 are Sobel derivatives of the
-    blurred image, x right and y down; `low` and `high` are the thresholds that were used [grey levels].
+    blurred image, x right and y down; `low` and `high` are the thresholds used [grey levels].
     """
 
     mask: Grey
@@ -45,16 +45,16 @@ def to_grey(image: NDArray[Any]) -> Grey:
     A grey image is returned as it is, not copied. Raises ImageShapeError for anything else.
     """
     if image.dtype != np.uint8 or image.size == 0:
-        raise ImageShapeError(f"image is {image.dtype} of shape {image.shape}: it must be uint8 and not empty")
+        raise ImageShapeError(f"image must be uint8 and not empty: got {image.dtype} of shape {image.shape}")
     if image.ndim == 2:
         return image
     if image.ndim == 3 and image.shape[2] == 3:
         return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    raise ImageShapeError(f"image has shape {image.shape}: it must be (h, w) grey or (h, w, 3) BGR")
+    raise ImageShapeError(f"image must be (h, w) grey or (h, w, 3) BGR: got shape {image.shape}")
 
 
 def automatic_thresholds(
-    gradient_x: NDArray[np.int16], gradient_y: NDArray[np.int16], parameters: EdgeMetricParameters
+    gradient_x: NDArray[np.int16], gradient_y: NDArray[np.int16], parameters: EdgeParameters
 ) -> tuple[float, float]:
     """Return Canny's lower and upper threshold for an image with these derivatives [grey levels].
 
@@ -69,18 +69,18 @@ def automatic_thresholds(
     return parameters.auto_low_ratio * high, high
 
 
-def detect_edges(grey: Grey, parameters: EdgeMetricParameters) -> Edges:
+def detect_edges(grey: Grey, parameters: EdgeParameters) -> Edges:
     """Return the edges of a (h, w) uint8 `grey` image.
 
     Canny thins the gradient to one pixel and follows edges from the upper down to the lower threshold. Raises
     ImageShapeError where `grey` is not a grey image.
     """
     if grey.ndim != 2 or grey.dtype != np.uint8 or grey.size == 0:
-        raise ImageShapeError(f"grey image is {grey.dtype} of shape {grey.shape}: it must be (h, w) uint8")
+        raise ImageShapeError(f"grey image must be (h, w) uint8 and not empty: got {grey.dtype} of shape {grey.shape}")
     if parameters.blur_sigma_px > 0.0:
         grey = cv2.GaussianBlur(grey, (0, 0), parameters.blur_sigma_px)
     gradient_x, gradient_y = cv2.spatialGradient(grey, borderType=cv2.BORDER_REPLICATE)  # both Sobel derivatives
-    if parameters.edge_method == "fixed":
+    if parameters.threshold_mode == "fixed":
         low, high = parameters.canny_low, parameters.canny_high
     else:
         low, high = automatic_thresholds(gradient_x, gradient_y, parameters)

@@ -9,8 +9,8 @@ distance g (Meijster, Roerdink and Hesselink 2000), and
 
     d(x, y)^2 = min over x' of (x - x')^2 + g(x', y)^2.
 
-Only the points asked for are evaluated, outwards from x, and each is dropped as soon as (x - x')^2 alone is larger than
-what it has: as edge pixels mostly have a neighbour within a few pixels, the work is a few gathers a point.
+Only the requested points are evaluated, outwards from x, and each is finished as soon as (x - x')^2 alone exceeds its
+minimum so far: as edge pixels mostly have a neighbour within a few pixels, the work is a few gathers a point.
 """
 
 from collections.abc import Callable, Sequence
@@ -60,7 +60,7 @@ class NearestEdges:
 
     @property
     def unreachable_px2(self) -> int:
-        """Squared distances of this and more mean that there is no edge pixel to be found."""
+        """Squared distances of this and more mean that there is no edge pixel."""
         return int(self._far) ** 2
 
     def from_edges(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:
@@ -95,7 +95,7 @@ class NearestEdges:
         """Return the squared distance from each place to the nearest edge pixel of the largest window."""
         width, squares = self._edges.shape[2], self._squares.ravel()
         if not self._edges.any(axis=(1, 2)).all():
-            return squares.take(at)  # there is nothing to be found
+            return squares.take(at)  # one image has no edge pixels
         start = line * width
         return _search(lambda index, _: squares.take(index), at, start, start + (width - 1))
 
@@ -129,7 +129,7 @@ def _borders(windows: tuple[Window, ...]) -> Indices:
 def _margins(windows: tuple[Window, ...]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Return how far each row, and each column, is inside each window: (windows, rows), (windows, columns).
 
-    For windows as large as the largest it is as good as infinite: nothing outside of it is looked at.
+    For windows as large as the largest one it is practically infinite: nothing outside is searched.
     """
     area = hull(windows)
     top, left, bottom, right = _borders(windows).T[:, :, None]
@@ -190,7 +190,7 @@ def _scan(edges: NDArray[np.bool_], scratch: Scratch) -> tuple[NDArray[Any], NDA
     np.copyto(above, row, where=edges)
     np.copyto(below, row, where=edges)
     step = 1
-    while step < height:  # after each round a pixel knows the edges within twice as many rows
+    while step < height:  # each round doubles the number of rows covered
         np.maximum(above[:, step:], above[:, :-step], out=spare[:, step:])
         spare[:, :step] = above[:, :step]
         above, spare = spare, above
@@ -223,8 +223,8 @@ def _search(
 ) -> NDArray[Any]:
     """Return min over x' of (x - x')^2 + vertical(x') for points `index` in rows from `row_start` to `row_end`.
 
-    `vertical` is given places and the points that look there. Steps that would leave the row are held at its end: too
-    far by their own reckoning, so never below the truth.
+    `vertical` is called with places and the indices of the points that ask for them. Steps that would leave the row are
+    clamped to its end, which overestimates the distance and never underestimates it.
     """
     active = np.arange(len(index))
     nearest = vertical(index, active)

@@ -1,8 +1,8 @@
 """Edge pixels by gradient direction, and truncated distances to those of one direction.
 
-An edge pixel that finds a neighbour has found its own surface only if that neighbour's edge runs the same way. Edge
+The nearest edge pixel of the other image belongs to the same surface only if its edge has the same direction. Edge
 pixels are therefore sorted into bins by the direction of their gradient, and distances are taken within a bin and cut
-off where a neighbour is too far to be the same edge.
+off where the nearest one is too far to be of the same edge.
 
 Up to eight bins share the bits of one byte a pixel. With distances cut off at a few pixels there are few different
 ones: plane i of `OrientedEdges.planes` has a bin's bit set where an edge pixel of that bin lies within the i-th one.
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.edges.edges import Edges
-from vergence_metric.edges.parameters import LARGEST_TRUNCATION_PX, MOST_BINS
+from vergence_metric.edges.parameters import MAX_BINS, MAX_TRUNCATION_PX
 from vergence_metric.edges.scratch import Scratch
 from vergence_metric.edges.windows import Window
 
@@ -27,7 +27,7 @@ Buffer = Callable[[tuple[int, ...], type[np.uint8]], NDArray[np.uint8]]
 
 @dataclass(frozen=True)
 class OrientedEdges:
-    """Edge pixels of one image inside the largest window, and who is near them.
+    """Edge pixels of one image inside the largest window, and the neighbourhood of every pixel.
 
     `row`, `column` (n,) count from the corner of the largest window, `bin` (n,) uint8 is the direction, `ring` (n,) the
     index of the smallest window that holds the pixel, windows sorted by size. `planes` (radii, pixels) uint8 are the
@@ -50,26 +50,26 @@ class OrientedField:
     bins: int
     truncation_px: int
     images: tuple[OrientedEdges, OrientedEdges]
-    _known: dict[tuple[object, ...], NDArray[Any]] = field(default_factory=dict, repr=False, compare=False)
+    _cache: dict[tuple[object, ...], NDArray[Any]] = field(default_factory=dict, repr=False, compare=False)
 
     def distances_px(self, direction: int, truncation_px: int) -> NDArray[np.float32]:
         """Return the truncated distance of each edge pixel of image `direction` to the other's of its bin, (n,)."""
         key = ("at edges", direction, truncation_px)
-        if key not in self._known:
+        if key not in self._cache:
             edges, planes = self.images[direction], self.images[1 - direction].planes
             steps = radius_steps(truncation_px)
             near = np.take(planes[: len(steps)], edges.at, axis=1)
             near >>= edges.bin
             near &= 1
-            self._known[key] = np.float32(truncation_px) - steps @ near.astype(np.float32)
-        return self._known[key]
+            self._cache[key] = np.float32(truncation_px) - steps @ near.astype(np.float32)
+        return self._cache[key]
 
     def mean_distances_px(self, image: int, truncation_px: int, points_per_side: int) -> NDArray[np.float64]:
         """Return the mean truncated distance to the edges of `image`, (windows, bins), over a lattice of pixels."""
         key = ("everywhere", image, truncation_px, points_per_side)
-        if key not in self._known:
-            self._known[key] = self._mean_distances(image, truncation_px, points_per_side)
-        return self._known[key]
+        if key not in self._cache:
+            self._cache[key] = self._mean_distances(image, truncation_px, points_per_side)
+        return self._cache[key]
 
     def fovea_weights(self, image: int, sigma_px: float) -> NDArray[np.float64]:
         """Return a Gaussian weight of each edge pixel of `image` about the windows' centre, (n,)."""
@@ -83,7 +83,7 @@ class OrientedField:
         # a bit becomes a byte of its own, so that one addition of words adds up all bins of a row's pixels
         of_rows = np.add.reduceat(_SPREAD.take(near), places.row_starts, axis=1).view(np.uint8)
         counts = np.add.reduceat(
-            of_rows.reshape(len(steps), -1, MOST_BINS), places.window_starts, axis=1, dtype=np.int64
+            of_rows.reshape(len(steps), -1, MAX_BINS), places.window_starts, axis=1, dtype=np.int64
         )[..., : self.bins]
         return truncation_px - np.tensordot(steps, counts, axes=1) / places.sizes[:, None]
 
@@ -133,13 +133,12 @@ def oriented_field(
 
     `bins` directions over 360 degrees where `signed` tells dark-to-bright from bright-to-dark, else over 180; the first
     is centred on horizontal gradients. Neighbours may lie outside a window: unlike the paper's metric this one only
-    looks `truncation_px` far, and edges cut off by a window's border would be nothing but noise.
+    reaches `truncation_px`, and edges cut off by a window's border would only add noise.
     With `scratch` the memory is taken from there: the field is then good until the next one made with it.
     """
-    if not 1 <= truncation_px <= LARGEST_TRUNCATION_PX or not 1 <= bins <= MOST_BINS:
+    if not 1 <= truncation_px <= MAX_TRUNCATION_PX or not 1 <= bins <= MAX_BINS:
         raise ValueError(
-            f"truncation of {truncation_px} px, {bins} bins: they must be from 1 to {LARGEST_TRUNCATION_PX} px and "
-            f"from 1 to {MOST_BINS}"
+            f"truncation_px must be 1 to {MAX_TRUNCATION_PX}, bins 1 to {MAX_BINS}: got {truncation_px} and {bins}"
         )
     ordered = tuple(sorted(windows, key=lambda window: window.size_px))
     scratch = scratch or Scratch()

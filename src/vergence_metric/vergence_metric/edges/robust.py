@@ -1,9 +1,9 @@
 """A robust form of the edge metric for windows that mix depths.
 
-The plain mean is carried away by the pixels of other depths, the more the larger the window (in the paper's own table
-300x300 reads 15.29 px at vergence where 50x50 reads about 5). Here each edge pixel looks for a neighbour of its own
-direction only, no distance counts for more than a few pixels, and edge pixels weigh less the farther they lie from the
-fovea, by a Gaussian of fixed width: what a larger window adds is mostly not what the eyes are turned to.
+The plain mean is dominated by the pixels of other depths, the more the larger the window (in the paper's own table
+300x300 is 15.29 px at vergence where 50x50 is about 5 px). Here each edge pixel is matched with one of its own
+direction only, distances are truncated to a few pixels, and edge pixels weigh less the farther they lie from the
+fovea, by a Gaussian of fixed width: what a larger window adds is mostly not the fixated surface.
 """
 
 import numpy as np

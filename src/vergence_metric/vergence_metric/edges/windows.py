@@ -15,7 +15,7 @@ class WindowError(ValueError):
 class Window:
     """A centre window of one image, cut to the image: rows `top` to `bottom`, columns `left` to `right`, half open.
 
-    `size_px` is the side that was asked for; `clipped` says that the image is smaller than that in one direction.
+    `size_px` is the requested side; `clipped` is true if the image is smaller than that in one direction.
     """
 
     size_px: int
@@ -55,7 +55,7 @@ def centre_window(size_px: int, height_px: int, width_px: int) -> Window:
     Raises WindowError where the window or the image has no extent.
     """
     if size_px < 1 or height_px < 1 or width_px < 1:
-        raise WindowError(f"window of {size_px} px in an image of {width_px}x{height_px}: each must be at least 1")
+        raise WindowError(f"window and image must measure at least 1 px: got {size_px} px in {width_px}x{height_px}")
     top, left = height_px // 2 - size_px // 2, width_px // 2 - size_px // 2
     return Window(size_px, max(top, 0), max(left, 0), min(top + size_px, height_px), min(left + size_px, width_px))
 

@@ -1,1 +1,1 @@
-"""The visual encoder: the eyes' true relative rotation from features that both see."""
+"""The visual encoder: the eyes' relative rotation from features matched between them."""

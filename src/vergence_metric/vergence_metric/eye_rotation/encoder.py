@@ -1,4 +1,4 @@
-"""The visual encoder on pairs of images: from pixels to the eyes' relative rotation, or why there is none."""
+"""The visual encoder on a pair of images: from pixels to the eyes' relative rotation, or the reason for none."""
 
 import math
 import time
@@ -13,9 +13,9 @@ from vergence_metric.eye_rotation.epipolar_view import epipolar_view
 from vergence_metric.eye_rotation.matching import MatchingSettings, matches
 from vergence_metric.eye_rotation.parameters import EncoderParameters
 from vergence_metric.eye_rotation.relative_rotation import (
-    MINIMUM_MATCHES,
+    MIN_MATCHES,
     RelativeRotation,
-    RigDoubt,
+    RigPrior,
     relative_rotation,
 )
 from vergence_rig.camera import CameraModel
@@ -25,8 +25,8 @@ from vergence_rig.rig import Rig
 Pixels = npt.NDArray[np.uint8]
 Models = tuple[CameraModel, CameraModel]
 
-_PLAY_TO_SIGMA = 1.0 / math.sqrt(3.0)
-_VERGENCE_PRIOR = 2.0
+_UNIFORM_TO_SIGMA = 1.0 / math.sqrt(3.0)
+_VERGENCE_SIGMAS = 2.0  # standard deviation of the vergence prior, as a multiple of the largest deviation
 
 
 class EyeRotationStatus(IntEnum):
@@ -44,9 +44,9 @@ class EyeRotationStatus(IntEnum):
 
 @dataclass(frozen=True)
 class EyeRotationReading:
-    """What one pair says: the rotation where the status is OK or tells why it is not believed, else None.
+    """Result of one pair. `rotation` is valid if `status` is OK, rejected for `reason` otherwise, None if not computed.
 
-    `joint_vergence_rad` is what the joints say, NaN if unknown.
+    `joint_vergence_rad` is the vergence by the joint angles, NaN if unknown.
     """
 
     status: EyeRotationStatus
@@ -60,27 +60,27 @@ class EyeRotationReading:
 
     @property
     def ok(self) -> bool:
-        """True if the rotation is to be believed."""
+        """True if the rotation is valid."""
         return self.status is EyeRotationStatus.OK
 
 
 class VisualEncoder:
-    """Measures pairs by their own; nothing is carried from one to the next."""
+    """Measures single pairs, without state between them."""
 
     def __init__(self, parameters: EncoderParameters, rig: Rig) -> None:
-        self.parameters = self._p = parameters
+        self._p = parameters
         self._baseline_m = rig.baseline_m
         servos = (rig.joints.pan_left.servo, rig.joints.pan_right.servo)
-        self._play_rad = sum(servo.uncertainty_rad for servo in servos)
-        self._pan_doubt_rad = _PLAY_TO_SIGMA * max(servo.uncertainty_rad for servo in servos)
+        self._servo_uncertainty_rad = sum(servo.uncertainty_rad for servo in servos)
+        self._pan_sigma_rad = _UNIFORM_TO_SIGMA * max(servo.uncertainty_rad for servo in servos)
 
     @property
-    def believed_rad(self) -> float:
-        """How far from the joints a vergence may be and still be believed."""
-        return self._play_rad + self._p.mount_tolerance_rad
+    def max_deviation_rad(self) -> float:
+        """Largest deviation from the joints' vergence that servos and mounts allow."""
+        return self._servo_uncertainty_rad + self._p.acceptance.mount_tolerance_rad
 
     def measure(self, left: Pixels, right: Pixels, eyes: EyeAngles, models: Models) -> EyeRotationReading:
-        """Return what a pair says.
+        """Measure a pair.
 
         Args:
             left: (h, w, 3) BGR or (h, w) grey image of the left eye.
@@ -97,14 +97,14 @@ class VisualEncoder:
         ]
         found = matches(views[0], views[1], self._matching())
         rotation = None
-        if len(found.left_px) >= MINIMUM_MATCHES:
+        if len(found.left_px) >= MIN_MATCHES:
             plane = [
                 view.to_image_plane(points) for view, points in zip(views, (found.left_px, found.right_px), strict=True)
             ]
             rotation = relative_rotation(
-                plane[0], plane[1], eyes.pan_left_rad, eyes.pan_right_rad, self._doubt(step_rad)
+                plane[0], plane[1], eyes.pan_left_rad, eyes.pan_right_rad, self._prior(step_rad)
             )
-        status, reason = self._verdict(rotation, len(found.left_px), found.corners, step_rad, eyes)
+        status, reason = self._accepted(rotation, len(found.left_px), found.corners, step_rad, eyes)
         return EyeRotationReading(
             status,
             reason,
@@ -118,60 +118,60 @@ class VisualEncoder:
 
     def _matching(self) -> MatchingSettings:
         return MatchingSettings(
-            features=self._p.features,
-            nearest_parallax_rad=2.0 * math.atan(0.5 * self._baseline_m / self._p.nearest_m),
-            aside_rad=self.believed_rad,
-            rows_px=round(self._p.row_search_px),
-            score=self._p.match_score,
-            other_score=self._p.rival_score,
+            features=self._p.matching.features,
+            nearest_parallax_rad=2.0 * math.atan(0.5 * self._baseline_m / self._p.matching.nearest_m),
+            aside_rad=self.max_deviation_rad,
+            rows_px=round(self._p.matching.row_search_px),
+            score=self._p.matching.min_score,
+            uniqueness=self._p.matching.uniqueness,
         )
 
-    def _doubt(self, step_rad: float) -> RigDoubt:
-        return RigDoubt(
-            vergence_rad=_VERGENCE_PRIOR * self.believed_rad,
-            pan_rad=math.hypot(self._pan_doubt_rad, 0.5 * self._p.mount_tolerance_rad),
-            focal=self._p.focal_doubt,
-            distortion=self._p.distortion_doubt,
-            centre_rad=self._p.centre_doubt_px * step_rad,
+    def _prior(self, step_rad: float) -> RigPrior:
+        return RigPrior(
+            vergence_rad=_VERGENCE_SIGMAS * self.max_deviation_rad,
+            pan_rad=math.hypot(self._pan_sigma_rad, 0.5 * self._p.acceptance.mount_tolerance_rad),
+            focal=self._p.prior.focal_sigma,
+            distortion=self._p.prior.distortion_sigma,
+            centre_rad=self._p.prior.centre_sigma_px * step_rad,
         )
 
-    def _verdict(
+    def _accepted(
         self, rotation: RelativeRotation | None, found: int, corners: int, step_rad: float, eyes: EyeAngles
     ) -> tuple[EyeRotationStatus, str]:
-        p = self._p
-        if rotation is None or found < p.least_inliers:
+        p = self._p.acceptance
+        if rotation is None or found < p.min_inliers:
             return (
                 EyeRotationStatus.FEW_FEATURES,
-                f"{found} of {corners} features found in both eyes: it takes {max(p.least_inliers, MINIMUM_MATCHES)}",
+                f"{found} of {corners} features matched: at least {max(p.min_inliers, MIN_MATCHES)} are needed",
             )
         residual_px = rotation.scale_rad / step_rad
         if (
-            rotation.inliers < p.least_inliers
-            or rotation.inlier_share < p.least_inlier_share
-            or residual_px > p.most_residual_px
+            rotation.inliers < p.min_inliers
+            or rotation.inlier_share < p.min_inlier_share
+            or residual_px > p.max_residual_px
         ):
             return (
                 EyeRotationStatus.DISAGREEING,
-                f"{rotation.inliers} of {found} matches agree, to {residual_px:.2f} px: no one rotation explains them",
+                f"only {rotation.inliers} of {found} matches agree on one rotation, to {residual_px:.2f} px",
             )
-        if not rotation.sigma_rad <= p.most_sigma_rad:
+        if not rotation.sigma_rad <= p.max_sigma_rad:
             return (
                 EyeRotationStatus.UNCERTAIN,
-                f"vergence is certain to {math.degrees(rotation.sigma_rad):.2f} degrees only: "
-                "the features do not spread over the image",
+                f"standard deviation of the vergence is {math.degrees(rotation.sigma_rad):.2f} degrees: "
+                "the features are not spread over the image",
             )
-        beyond_rad = abs(rotation.vergence_rad - eyes.vergence_rad)
-        if beyond_rad > self.believed_rad:
+        deviation_rad = abs(rotation.vergence_rad - eyes.vergence_rad)
+        if deviation_rad > self.max_deviation_rad:
             return (
                 EyeRotationStatus.CONTRADICTORY,
-                f"vergence is {math.degrees(beyond_rad):.2f} degrees off the joints': "
-                f"servos and mounts allow {math.degrees(self.believed_rad):.2f}",
+                f"vergence differs from the joints' by {math.degrees(deviation_rad):.2f} degrees: "
+                f"servos and mounts allow {math.degrees(self.max_deviation_rad):.2f}",
             )
         return EyeRotationStatus.OK, ""
 
 
 def not_measured(status: EyeRotationStatus, reason: str, eyes: EyeAngles | None = None) -> EyeRotationReading:
-    """Return that a pair was not even looked at, and why."""
+    """Return the reading of a pair that was not measured, with the reason."""
     return EyeRotationReading(status, reason, math.nan if eyes is None else eyes.vergence_rad)
 
 

@@ -1,9 +1,8 @@
-"""What an eye sees, drawn over the angles in which the epipolar lines of two eyes on one bar are rows.
+"""An eye's image resampled over angles in which the epipolar lines of two eyes on one bar are rows.
 
-With the y axis along the baseline, a point's epipolar plane is its angle about that axis, and where it lies in the
-plane is its angle to the bar's middle plane (polar rectification, Pollefeys 1999). In these two angles both eyes see a
-point in the same row, however they pan and however near the epipoles are, and patches of both look alike but for their
-slant.
+With the y axis along the baseline, a point's epipolar plane is given by its angle about that axis, and its position in
+the plane by its angle to the bar's middle plane (polar rectification, Pollefeys 1999). In these two angles a point lies
+in the same row for both eyes, at any pan and with any epipoles, and patches of both differ by their slant only.
 """
 
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ _OUTSIDE = -1e4
 
 @dataclass(frozen=True)
 class EpipolarView:
-    """One eye's image over angles: `grey` (h, w) uint8, `seen` (h, w) bool where the eye sees anything.
+    """One eye's image over angles: `grey` (h, w) uint8, `seen` (h, w) bool inside the eye's image.
 
     Column x is the angle `aside_rad - (x - cx) * step_rad` to the left of the bar's middle plane, row y the angle
     `-(y - cy) * step_rad` upwards about the baseline; cx, cy is the middle of the view.
@@ -45,10 +44,10 @@ class EpipolarView:
 
 
 def epipolar_view(grey: Pixels, camera: CameraModel, pan_rad: float, step_rad: float) -> EpipolarView:
-    """Draw a grey image (h, w) of an eye that pans by `pan_rad` over the bar's angles, one pixel for `step_rad`."""
+    """Return a grey image (h, w) of an eye panned by `pan_rad`, resampled over the bar's angles, `step_rad` a pixel."""
     shape = (round(grey.shape[0] * _HEIGHT_SHARE), grey.shape[1])
     bar_from_eye = rotation_rig_from_eye(pan_rad, 0.0)
-    # The map from angles to pixels is smooth: its nodes are computed, what lies between is interpolated.
+    # The map from angles to pixels is smooth: it is computed at nodes and interpolated in between.
     rows, columns = (np.arange(0, size + _NODE_PX, _NODE_PX, dtype=np.float64) for size in shape)
     x, y = np.meshgrid(columns, rows)
     nodes = np.column_stack([x.ravel(), y.ravel()])
@@ -70,7 +69,7 @@ def _rays(points: Array, shape: tuple[int, ...], aside_rad: float, step_rad: flo
 
 
 def _between(nodes: Array, shape: tuple[int, int]) -> npt.NDArray[np.float32]:
-    """Return the values (h, w) between nodes that stand every _NODE_PX pixels."""
+    """Return the values (h, w) between nodes at every _NODE_PX pixels."""
     scale = np.array([[_NODE_PX, 0.0, 0.0], [0.0, _NODE_PX, 0.0]])
     height, width = shape
     found = cv2.warpAffine(nodes.astype(np.float32), scale, (width, height), flags=cv2.INTER_LINEAR)

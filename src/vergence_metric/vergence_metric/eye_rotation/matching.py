@@ -1,8 +1,8 @@
-"""The same features in both eyes, to a fraction of a pixel, found along the rows of two epipolar views.
+"""Features matched between both eyes to a fraction of a pixel, along the rows of two epipolar views.
 
-Corners are taken evenly from all over the left view, because vergence shows only in how rows differ between its four
-quarters. Each is looked for where a point at any depth may lie, at half resolution by correlation; Lucas and Kanade's
-method refines it at full resolution, and refined back it has to arrive where it came from.
+Corners are spread evenly over the left view, because vergence shows only in how rows differ between its four quarters.
+Each is searched over all depths, by correlation at half resolution, and refined by Lucas and Kanade's method at full
+resolution; refinement back to the left view has to return to the corner.
 """
 
 from dataclasses import dataclass
@@ -18,20 +18,20 @@ Pixels = npt.NDArray[np.uint8]
 
 _CELLS = (10, 8)
 _PATCH_PX = 7  # half a template, at half resolution
-_LEVEL_SIGMA_PX = 6.0
-_LEVEL_GAIN = 45.0
-_LEVEL_FLOOR = 4.0
-_OTHER_PEAK_PX = 3
+_NORMALISE_SIGMA_PX = 6.0
+_NORMALISE_GAIN = 45.0
+_NORMALISE_FLOOR = 4.0
+_PEAK_RADIUS_PX = 3
 _LK_WINDOW_PX = 17
 _LK_ROUNDS = 30
-_LK_FARTHEST_PX = 3.0
+_LK_MAX_SHIFT_PX = 3.0
 _BACK_PX = 0.3
 _MARGIN_PX = 12
 
 
 @dataclass(frozen=True)
 class MatchingSettings:
-    """How many features are looked for, how far, and what a match must score."""
+    """Number of features, search range, and the scores that a match needs."""
 
     features: int = 400
     quality: float = 0.01
@@ -39,12 +39,12 @@ class MatchingSettings:
     aside_rad: float = 0.035
     rows_px: int = 14
     score: float = 0.8
-    other_score: float = 0.96
+    uniqueness: float = 0.96
 
 
 @dataclass(frozen=True)
 class Matches:
-    """Matched points (N, 2) [px] of the left and the right view, and how many corners there were to match."""
+    """Matched points (N, 2) [px] of the left and the right view, and the number of corners detected."""
 
     left_px: Array
     right_px: Array
@@ -52,8 +52,8 @@ class Matches:
 
 
 def matches(left: EpipolarView, right: EpipolarView, settings: MatchingSettings) -> Matches:
-    """Return features that both views show."""
-    views = [_levelled(view.grey) for view in (left, right)]
+    """Return the features matched between both views."""
+    views = [_normalised(view.grey) for view in (left, right)]
     corners = _corners(views[0], left.seen, settings)
     if not len(corners):
         return Matches(np.empty((0, 2)), np.empty((0, 2)), 0)
@@ -63,17 +63,17 @@ def matches(left: EpipolarView, right: EpipolarView, settings: MatchingSettings)
     return Matches(corners_there[kept].astype(np.float64), right_px[kept].astype(np.float64), len(corners))
 
 
-def _levelled(grey: Pixels) -> Pixels:
-    """Return a view without its local brightness and contrast: the eyes' exposures differ."""
+def _normalised(grey: Pixels) -> Pixels:
+    """Return a view with local brightness and contrast normalised: the eyes' exposures differ."""
     image = grey.astype(np.float32)
-    mean = cv2.GaussianBlur(image, (0, 0), _LEVEL_SIGMA_PX)
-    square = cv2.GaussianBlur(image * image, (0, 0), _LEVEL_SIGMA_PX)
-    spread = np.sqrt(np.maximum(square - mean * mean, 0.0)) + _LEVEL_FLOOR
-    return np.asarray(np.clip(128.0 + _LEVEL_GAIN * (image - mean) / spread, 0, 255), np.uint8)
+    mean = cv2.GaussianBlur(image, (0, 0), _NORMALISE_SIGMA_PX)
+    square = cv2.GaussianBlur(image * image, (0, 0), _NORMALISE_SIGMA_PX)
+    spread = np.sqrt(np.maximum(square - mean * mean, 0.0)) + _NORMALISE_FLOOR
+    return np.asarray(np.clip(128.0 + _NORMALISE_GAIN * (image - mean) / spread, 0, 255), np.uint8)
 
 
 def _corners(view: Pixels, seen: npt.NDArray[np.bool_], settings: MatchingSettings) -> npt.NDArray[np.float32]:
-    """Return corners (N, 2) [px], as many from every cell of a grid."""
+    """Return corners (N, 2) [px], up to the same number from every cell of a grid."""
     strength = cv2.cornerMinEigenVal(view, 7)
     inside = cv2.erode(
         seen.astype(np.uint8), np.ones((2 * _MARGIN_PX + 1, 2 * _MARGIN_PX + 1), np.uint8), borderValue=0
@@ -98,11 +98,11 @@ def _search(
     geometry: tuple[EpipolarView, EpipolarView],
     s: MatchingSettings,
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.float32]]:
-    """Return which corners have one clear counterpart, and where (N, 2) [px], to about a pixel."""
+    """Return which corners have one unambiguous match, and its position (N, 2) [px], to about a pixel."""
     left, right = (cv2.resize(view, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for view in views)
     step = 2.0 * geometry[0].step_rad
     nearer, farther = round(s.nearest_parallax_rad / step), round(s.aside_rad / step)
-    # A point at infinity has the same angle in both eyes, in views that begin at different ones.
+    # A point at infinity has the same angle in both eyes; the views' centres have different ones.
     shift = (geometry[1].aside_rad - geometry[0].aside_rad) / step
     rows = max(s.rows_px // 2, 1)
     height, width = right.shape
@@ -122,10 +122,10 @@ def _search(
         if best < s.score or on_rim:
             continue
         scores[
-            max(row - _OTHER_PEAK_PX, 0) : row + _OTHER_PEAK_PX + 1,
-            max(column - _OTHER_PEAK_PX, 0) : column + _OTHER_PEAK_PX + 1,
+            max(row - _PEAK_RADIUS_PX, 0) : row + _PEAK_RADIUS_PX + 1,
+            max(column - _PEAK_RADIUS_PX, 0) : column + _PEAK_RADIUS_PX + 1,
         ] = -1
-        if float(scores.max()) > s.other_score * best:
+        if float(scores.max()) > s.uniqueness * best:
             continue
         found[i] = True
         places[i] = x_full + 2 * (x0 + column + p - x), y_full + 2 * (y0 + row + p - y)
@@ -139,13 +139,13 @@ def _refined(
     start: npt.NDArray[np.float32],
     seen: npt.NDArray[np.bool_],
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.float32]]:
-    """Return which matches hold from left to right and back, and where they are in the right view (N, 2) [px]."""
+    """Return which matches are consistent from left to right and back, and their right positions (N, 2) [px]."""
     if not len(corners):
         return np.zeros(0, np.bool_), start
     there, ok_there = _flow(left, right, corners, start)
     back, ok_back = _flow(right, left, there, corners + 1.0)
     kept = ok_there & ok_back
-    kept &= np.abs(there - start).max(axis=1) < _LK_FARTHEST_PX
+    kept &= np.abs(there - start).max(axis=1) < _LK_MAX_SHIFT_PX
     kept &= np.abs(back - corners).max(axis=1) < _BACK_PX
     column = np.clip(np.rint(there[:, 0]).astype(int), 0, right.shape[1] - 1)
     row = np.clip(np.rint(there[:, 1]).astype(int), 0, right.shape[0] - 1)
@@ -155,7 +155,7 @@ def _refined(
 def _flow(
     first: Pixels, second: Pixels, points: npt.NDArray[np.float32], guess: npt.NDArray[np.float32]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
-    """Return where points (N, 2) of the first view are in the second, near their guesses, and which were found."""
+    """Return positions (N, 2) in the second view of points of the first, near their guesses, and which converged."""
     moved, found, _ = cv2.calcOpticalFlowPyrLK(
         first,
         second,

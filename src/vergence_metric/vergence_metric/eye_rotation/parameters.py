@@ -1,84 +1,175 @@
-"""Parameters of eye_rotation_node: its input, when it measures, what it looks for and what it believes."""
+"""Parameters of eye_rotation_node: when pairs are measured, how features are matched, what a result must meet."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from vergence_metric.pairs.stereo_parameters import StereoParameters
+from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_rig.parameters import Groups, Parameters, parameter
 
 
 @dataclass(frozen=True)
-class EncoderParameters(Parameters):
-    """How the eyes' relative rotation is measured on a pair."""
+class EyeRotationNodeParameters(StereoParameters):
+    """How often eye_rotation_node measures, and where its images come from."""
 
-    features: int = parameter(400, "corners looked for, evenly over the left image", minimum=60, maximum=5000)
-    nearest_m: float = parameter(
-        0.22, "matches are looked for from infinity to this distance", unit="m", minimum=0.05, maximum=10.0
+    rate_hz: float = parameter(
+        3.0, "rate of measurements; images in between are not decoded", unit="Hz", minimum=0.05, maximum=30.0
     )
-    row_search_px: float = parameter(
-        14.0, "matches may lie this far above or below: roll and pitch of the mounts", unit="px", minimum=2, maximum=60
-    )
-    match_score: float = parameter(0.8, "least correlation of a match, at half resolution", minimum=0.3, maximum=0.999)
-    rival_score: float = parameter(
-        0.96,
-        "a match whose second best place scores more than this share of its best is left out",
-        minimum=0.5,
-        maximum=1,
-    )
-    mount_tolerance_rad: float = parameter(
-        0.0175,
-        "beyond the servos' play, this much difference from the joints is believed",
-        unit="rad",
-        minimum=0.0,
-        maximum=0.3,
-    )
-    least_inliers: int = parameter(60, "fewer agreeing matches are no measurement", minimum=30, maximum=5000)
-    least_inlier_share: float = parameter(
-        0.6, "a smaller share of agreeing matches is no measurement", minimum=0.1, maximum=1.0
-    )
-    most_residual_px: float = parameter(
-        0.6,
-        "inliers farther from their epipolar lines than this are no measurement",
-        unit="px",
-        minimum=0.01,
-        maximum=10,
-    )
-    most_sigma_rad: float = parameter(
-        0.0035, "a vergence less certain than this is not given out", unit="rad", minimum=1e-5, maximum=0.1
-    )
-    focal_doubt: float = parameter(
-        0.001, "standard deviation of each focal length as calibrated, relative", minimum=0.0, maximum=0.1
-    )
-    distortion_doubt: float = parameter(
-        0.002, "standard deviation of each lens's k1 as calibrated", minimum=0.0, maximum=0.5
-    )
-    centre_doubt_px: float = parameter(
-        0.1,
-        "standard deviation of each principal point as calibrated: what the pans' zero has not taken up",
-        unit="px",
-        minimum=0.0,
-        maximum=20.0,
-    )
-    most_motion_px: float = parameter(
-        0.15, "the view may move by this from the left to the right exposure", unit="px", minimum=0.01, maximum=10
-    )
-    settle_s: float = parameter(
-        0.15, "the joints have to rest for this long before an exposure", unit="s", minimum=0.0, maximum=2.0
-    )
-    still_rad: float = parameter(0.002, "joints that moved by less were at rest", unit="rad", minimum=1e-5, maximum=0.1)
 
 
 @dataclass(frozen=True)
-class EyeRotationNodeParameters(EncoderParameters, StereoParameters):
-    """Everything eye_rotation_node can be told; defaults equal config/eye_rotation_node.yaml."""
+class RestParameters(Parameters):
+    """When eyes and head count as at rest: only then a pair is measured."""
 
-    rate_hz: float = parameter(
-        3.0, "measurements a second; what lies between is not even decoded", unit="Hz", minimum=0.05, maximum=30.0
+    settle_s: float = parameter(
+        0.15,
+        "time for which the joints must be at rest before an exposure",
+        unit="s",
+        minimum=0.0,
+        maximum=2.0,
+        formerly="settle_s",
+    )
+    max_joint_rad: float = parameter(
+        0.002,
+        "joints that move by no more than this, from rest.settle_s before an exposure to its end, are at rest",
+        unit="rad",
+        minimum=1e-5,
+        maximum=0.1,
+        formerly="still_rad",
+    )
+    max_image_motion_px: float = parameter(
+        0.15,
+        "largest motion of the left image in the time between left and right exposure",
+        unit="px",
+        minimum=0.01,
+        maximum=10,
+        formerly="most_motion_px",
     )
 
-    def check(self) -> None:
-        """Hold every part to its own rules."""
-        for part in (EncoderParameters, StereoParameters):
-            part.check(self)
+
+@dataclass(frozen=True)
+class MatchingParameters(Parameters):
+    """How features of the left image are matched in the right one."""
+
+    features: int = parameter(
+        400,
+        "number of corners detected, spread evenly over the left image",
+        minimum=60,
+        maximum=5000,
+        formerly="features",
+    )
+    nearest_m: float = parameter(
+        0.22,
+        "features are matched from infinity to this distance",
+        unit="m",
+        minimum=0.05,
+        maximum=10.0,
+        formerly="nearest_m",
+    )
+    row_search_px: float = parameter(
+        14.0,
+        "largest distance of a match from its epipolar row, for roll and pitch of the camera mounts",
+        unit="px",
+        minimum=2,
+        maximum=60,
+        formerly="row_search_px",
+    )
+    min_score: float = parameter(
+        0.8,
+        "least correlation of a match, at half resolution",
+        minimum=0.3,
+        maximum=0.999,
+        formerly="match_score",
+    )
+    uniqueness: float = parameter(
+        0.96,
+        "a match is ambiguous, and left out, if a second place scores more than this share of the best one",
+        minimum=0.5,
+        maximum=1,
+        formerly="rival_score",
+    )
 
 
-GROUPS: Groups = (("", EyeRotationNodeParameters),)
+@dataclass(frozen=True)
+class CalibrationPriorParameters(Parameters):
+    """How exact the cameras' calibration is."""
+
+    focal_sigma: float = parameter(
+        0.001,
+        "standard deviation of each calibrated focal length, relative",
+        minimum=0.0,
+        maximum=0.1,
+        formerly="focal_doubt",
+    )
+    distortion_sigma: float = parameter(
+        0.002,
+        "standard deviation of each lens's calibrated k1",
+        minimum=0.0,
+        maximum=0.5,
+        formerly="distortion_doubt",
+    )
+    centre_sigma_px: float = parameter(
+        0.1,
+        "standard deviation of each calibrated principal point, beyond what the zero of the pan joints includes",
+        unit="px",
+        minimum=0.0,
+        maximum=20.0,
+        formerly="centre_doubt_px",
+    )
+
+
+@dataclass(frozen=True)
+class AcceptanceParameters(Parameters):
+    """What a measurement must meet to be published as valid."""
+
+    mount_tolerance_rad: float = parameter(
+        0.0175,
+        "largest difference of the measured vergence from the joints', beyond the servos' uncertainty",
+        unit="rad",
+        minimum=0.0,
+        maximum=0.3,
+        formerly="mount_tolerance_rad",
+    )
+    min_inliers: int = parameter(
+        60, "least number of matches that agree on one rotation", minimum=30, maximum=5000, formerly="least_inliers"
+    )
+    min_inlier_share: float = parameter(
+        0.6,
+        "least share of matches that agree on one rotation",
+        minimum=0.1,
+        maximum=1.0,
+        formerly="least_inlier_share",
+    )
+    max_residual_px: float = parameter(
+        0.6,
+        "largest scale of the inliers' distances from their epipolar lines",
+        unit="px",
+        minimum=0.01,
+        maximum=10,
+        formerly="most_residual_px",
+    )
+    max_sigma_rad: float = parameter(
+        0.0035,
+        "largest standard deviation of the measured vergence",
+        unit="rad",
+        minimum=1e-5,
+        maximum=0.1,
+        formerly="most_sigma_rad",
+    )
+
+
+@dataclass(frozen=True)
+class EncoderParameters:
+    """The groups that the measurement of a pair needs."""
+
+    matching: MatchingParameters = field(default_factory=MatchingParameters)
+    prior: CalibrationPriorParameters = field(default_factory=CalibrationPriorParameters)
+    acceptance: AcceptanceParameters = field(default_factory=AcceptanceParameters)
+
+
+GROUPS: Groups = (
+    ("", EyeRotationNodeParameters),
+    ("pair.", PairingParameters),
+    ("rest.", RestParameters),
+    ("matching.", MatchingParameters),
+    ("prior.", CalibrationPriorParameters),
+    ("acceptance.", AcceptanceParameters),
+)

@@ -1,4 +1,4 @@
-"""The period of a stream of frames, and the earliest time its next frame can come, from the stamps alone."""
+"""Period of a stream of frames, and the earliest time of its next frame, from the stamps alone."""
 
 from bisect import bisect_left, insort
 from collections import deque
@@ -8,7 +8,7 @@ _ENOUGH = 4
 
 
 class FrameInterval:
-    """Learns from the intervals between a stream's stamps; lost frames and jitter do not mislead it."""
+    """Estimates the period from the intervals between stamps; robust to lost frames and jitter."""
 
     __slots__ = ("_recent", "_sorted", "earliest_ns", "period_ns")
 
@@ -18,11 +18,11 @@ class FrameInterval:
         self.period_ns: int | None = None
         """Median interval [ns]; None before the first."""
         self.earliest_ns = 0
-        """No next frame is expected sooner than this after the last [ns]: the shortest interval seen lately, less its
-        distance from the median once more, less what few intervals cannot show. 0 at first."""
+        """Lower bound of the interval to the next frame [ns]: the shortest recent interval, less its distance from the
+        median, less a margin while there are few intervals. 0 at first."""
 
     def add(self, interval_ns: int) -> None:
-        """Take the interval between two frames that followed one another [ns]."""
+        """Add the interval between two successive frames [ns]."""
         recent, ordered = self._recent, self._sorted
         if len(recent) == WINDOW:
             del ordered[bisect_left(ordered, recent.popleft())]

@@ -1,21 +1,21 @@
-"""Frames of two cameras become pairs, by their stamps.
+"""Pairing the frames of two cameras by their stamps.
 
 A pair is a left and a right frame of which each is the other's nearest among the frames that no earlier pair has used,
-at most the slop apart (inclusive). It is given out as soon as no later frame can change that:
+at most the slop apart (inclusive). It is released as soon as no later frame can change that:
 
 - equal stamps at once;
 - else, because stamps of one camera only grow, the later frame of the two is the earlier one's nearest for good, and
   only the next frame of the earlier one's camera could be nearer to the later. If that frame is here it decides; if it
-  cannot come soon enough, by the shortest interval that camera has shown lately, the pair is given out at once; else it
-  is waited for, at most a time limit measured in the cameras' period.
+  cannot come soon enough, by the shortest recent interval of that camera, the pair is released at once; else it is
+  waited for, up to a time limit in periods of the camera.
 
 So two 30 Hz cameras up to nearly half a period apart pair without waiting. At half a period, within the cameras'
-jitter, nobody can know which frame will be the nearer one: there the wait is inherent, until the earlier camera's next
+jitter, it is undecided which frame will be the nearer one: there the wait is inherent, until the earlier camera's next
 frame is here, which takes half a period more; the time limit counts only where that frame is lost. While fewer than
 four intervals of a camera are known, every pair of unequal stamps waits so, up to a period less the skew.
 
-Each frame is queued once and removed once: O(1) amortised. Times are integer nanoseconds. One thread uses a pairer; it
-holds no lock and calls nobody.
+Each frame is queued once and removed once: O(1) amortised. Times are integer nanoseconds. For one thread; no lock, no
+callbacks.
 """
 
 from collections import deque
@@ -23,17 +23,17 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from vergence_metric.pairs.frame_interval import FrameInterval
+from vergence_metric.pairs.pair_statistics import PairStatistics
 from vergence_metric.pairs.parameters import PairingParameters
-from vergence_metric.pairs.statistics import PairStatistics
 
 Frame = TypeVar("Frame")
 
 LEFT, RIGHT = 0, 1
 
 JUMP_NS = 1_000_000_000
-"""A stamp that is this much before its predecessor's, or after it, is a jump of time or a restarted camera."""
+"""A stamp this much before or after its predecessor is a jump of time or a restarted camera [ns]."""
 
-_LATE_RUN = 3  # so many growing stamps in a row behind the last one are a clock that was set back a little
+_LATE_RUN = 3  # increasing stamps in a row, all behind the last one, after which the clock counts as set back
 _UNKNOWN_PERIOD_NS = 100_000_000
 
 
@@ -53,13 +53,13 @@ class Pair(Generic[Frame]):
 
 
 class _Stream(Generic[Frame]):
-    """One camera's frames that wait, and what is known of its clock."""
+    """One camera's queue of frames, and the state of its clock."""
 
     def __init__(self, side: int) -> None:
         self.side = side
-        self.forget()
+        self.clear()
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         self.pending: deque[tuple[int, int, Frame]] = deque()
         self.stamp_ns: int | None = None
         self.removed_ns: int | None = None
@@ -73,33 +73,33 @@ class _Stream(Generic[Frame]):
         self.arrival_interval_ns = 0
 
     def wait_ns(self) -> int:
-        """Return one period as it passes here: longer than by the stamps where a recording is replayed slowly."""
+        """Return one period in arrival time: longer than by the stamps if a recording is replayed slowly."""
         return max(self.interval.period_ns or _UNKNOWN_PERIOD_NS, self.arrival_interval_ns)
 
 
 class StereoPairer(Generic[Frame]):
-    """Pairs two streams; see the module's text. `statistics` counts what became of every frame."""
+    """Pairs two streams; see the module's docstring. `statistics` counts what happened to every frame."""
 
     def __init__(self, parameters: PairingParameters) -> None:
         self.statistics = PairStatistics()
         self.deadline_ns: int | None = None
-        """Call `expire` at this time, on the clock of `now_ns`; None: there is nothing to wait for."""
+        """Time at which to call `expire`, on the clock of `now_ns`; None if no pair waits."""
         self._streams: tuple[_Stream[Frame], _Stream[Frame]] = (_Stream(LEFT), _Stream(RIGHT))
         self.set_parameters(parameters)
 
     def set_parameters(self, parameters: PairingParameters) -> None:
-        """Pair by these from the next frame on."""
-        self._slop_ns = round(parameters.pair_slop_s * 1e9)
-        self._wait_periods = parameters.pair_wait_periods
-        self._queue = parameters.pair_queue
+        """Use these from the next frame on."""
+        self._slop_ns = round(parameters.slop_s * 1e9)
+        self._wait_periods = parameters.wait_periods
+        self._queue = parameters.queue
 
     def add(self, side: int, stamp_ns: int, frame: Frame, now_ns: int) -> list[Pair[Frame]]:
-        """Take a frame and return the pairs that are now certain, none or more, in order.
+        """Add a frame and return the pairs that are now decided, none or more, in order.
 
         Args:
             side: LEFT or RIGHT.
             stamp_ns: when the frame was taken, on the clock that both cameras share.
-            frame: anything; it comes back in the pair.
+            frame: any object; it is returned in the pair.
             now_ns: the present time on a steady clock, the same for `expire`.
         """
         stream = self._streams[side]
@@ -115,7 +115,7 @@ class StereoPairer(Generic[Frame]):
                 stream.restart()
             else:
                 stream.interval.add(step_ns)
-                self._note_arrival(stream, now_ns)
+                self._update_arrival_interval(stream, now_ns)
         stream.stamp_ns = stamp_ns
         stream.arrived_ns = now_ns
         stream.late_run = 0
@@ -123,18 +123,18 @@ class StereoPairer(Generic[Frame]):
         pending.append((stamp_ns, now_ns, frame))
         if len(pending) > self._queue:
             self._drop(stream, None)
-        return self._settle(now_ns)
+        return self._release(now_ns)
 
     def expire(self, now_ns: int) -> list[Pair[Frame]]:
         """Return the pairs whose time limit is over at `now_ns`."""
-        return self._settle(now_ns)
+        return self._release(now_ns)
 
     def reset(self) -> None:
-        """Forget every frame and what was learnt of the cameras: the stamps jumped."""
+        """Drop every frame and the cameras' intervals, after a jump of the stamps."""
         self.statistics.resets += 1
         for stream in self._streams:
             self.statistics.unmatched[stream.side] += len(stream.pending)
-            stream.forget()
+            stream.clear()
         self.deadline_ns = None
 
     @staticmethod
@@ -144,7 +144,7 @@ class StereoPairer(Generic[Frame]):
         return -step_ns > JUMP_NS or stream.late_run >= _LATE_RUN
 
     @staticmethod
-    def _note_arrival(stream: _Stream[Frame], now_ns: int) -> None:
+    def _update_arrival_interval(stream: _Stream[Frame], now_ns: int) -> None:
         if stream.arrived_ns is None:
             return
         passed_ns, mean_ns = now_ns - stream.arrived_ns, stream.arrival_interval_ns
@@ -153,8 +153,8 @@ class StereoPairer(Generic[Frame]):
         else:
             stream.arrival_interval_ns = mean_ns + (min(passed_ns, 4 * mean_ns) - mean_ns) // 16
 
-    def _settle(self, now_ns: int) -> list[Pair[Frame]]:
-        settled: list[Pair[Frame]] = []
+    def _release(self, now_ns: int) -> list[Pair[Frame]]:
+        released: list[Pair[Frame]] = []
         left, right = self._streams
         self.deadline_ns = None
         while left.pending and right.pending:
@@ -179,10 +179,10 @@ class StereoPairer(Generic[Frame]):
                     if now_ns < deadline_ns:
                         self.deadline_ns = deadline_ns
                         break
-            settled.append(self._take())
-        return settled
+            released.append(self._pop_pair())
+        return released
 
-    def _take(self) -> Pair[Frame]:
+    def _pop_pair(self) -> Pair[Frame]:
         left, right = self._streams
         left_ns, _, left_frame = left.pending.popleft()
         right_ns, _, right_frame = right.pending.popleft()
@@ -191,7 +191,7 @@ class StereoPairer(Generic[Frame]):
         return Pair(left_frame, right_frame, left_ns, right_ns)
 
     def _drop(self, stream: _Stream[Frame], other: _Stream[Frame] | None) -> None:
-        """Drop a stream's oldest frame; its nearest partner is the other's oldest, or the one that went before it."""
+        """Drop a stream's oldest frame; nearest to it is the other stream's oldest frame, or the one removed before."""
         stamp_ns = stream.pending.popleft()[0]
         stream.removed_ns = stamp_ns
         skew_ns = None

@@ -1,4 +1,4 @@
-"""How long each stage of the work on a pair has taken of late."""
+"""Recent durations of each stage of measuring a pair."""
 
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -11,29 +11,29 @@ _RECENT = 150
 
 
 class StageTimes:
-    """Times by stage, over the latest pairs. One thread adds; another may ask."""
+    """Durations by stage, over the latest pairs. One thread adds; another may read."""
 
     def __init__(self) -> None:
         self._seconds: dict[str, deque[float]] = {}
 
     def add(self, stage: str, seconds: float) -> None:
-        """Take one time of a stage [s]."""
+        """Add one duration of a stage [s]."""
         self._seconds.setdefault(stage, deque(maxlen=_RECENT)).append(seconds)
 
     def add_all(self, stage_s: Mapping[str, float]) -> None:
-        """Take one time of each stage [s]."""
+        """Add one duration of each stage [s]."""
         for stage, seconds in stage_s.items():
             self.add(stage, seconds)
 
     @contextmanager
     def measure(self, stage: str) -> Iterator[None]:
-        """Take the time of the block as one of the stage's, unless it raises."""
+        """Add the duration of the block to the stage, unless the block raises."""
         started = perf_counter()
         yield
         self.add(stage, perf_counter() - started)
 
     def summary(self) -> dict[str, float]:
-        """Return `<stage>_median_ms` and `<stage>_p99_ms` of every stage, in the order they first came [ms]."""
+        """Return `<stage>_median_ms` and `<stage>_p99_ms` of every stage, in order of their first addition [ms]."""
         figures = {}
         for stage, recent in list(self._seconds.items()):
             median, high = np.percentile(recent.copy(), (50, 99)) * 1e3

@@ -1,4 +1,4 @@
-"""What a stream of images says about itself: rate, age, refusals, and one sentence on what is wrong."""
+"""Health of a stream of images: rate, age, images refused, and one sentence of status."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -8,11 +8,11 @@ _RECENT = 90
 
 
 @dataclass(frozen=True)
-class Finding:
-    """`fine`, one sentence, and figures by name."""
+class StreamStatus:
+    """Whether a stream is in order, one sentence, and figures by name."""
 
-    fine: bool
-    sentence: str
+    ok: bool
+    message: str
     values: dict[str, object] = field(default_factory=dict)
 
 
@@ -30,26 +30,26 @@ class StreamHealth:
         self._ages_s: deque[float] = deque(maxlen=_RECENT)
 
     def accept(self, now_s: float, age_s: float, size_px: tuple[int, int]) -> None:
-        """Take a usable image of (width, height)."""
-        self.looked_into(size_px)
-        self.pass_over(now_s, age_s)
+        """Count a usable image of (width, height)."""
+        self.decoded(size_px)
+        self.count(now_s, age_s)
 
-    def looked_into(self, size_px: tuple[int, int]) -> None:
-        """Take note that an image was good and of (width, height)."""
+    def decoded(self, size_px: tuple[int, int]) -> None:
+        """Record that a counted image could be decoded, and its (width, height)."""
         self.size_px = size_px
         self._refusal = None
 
-    def pass_over(self, now_s: float, age_s: float) -> None:
-        """Take an image that nobody looked into."""
+    def count(self, now_s: float, age_s: float) -> None:
+        """Count an image that has arrived, decoded or not."""
         if now_s - self._last_s > 1.0:
-            self._arrivals_s.clear()  # a rate over a gap says nothing
+            self._arrivals_s.clear()  # no rate over a gap
         self.received += 1
         self._last_s = now_s
         self._arrivals_s.append(now_s)
         self._ages_s.append(age_s)
 
     def refuse(self, now_s: float, reason: str) -> None:
-        """Take an image that cannot be used."""
+        """Count an image that cannot be used, and why."""
         self.received += 1
         self._last_s = now_s
         self._refusal = reason
@@ -57,14 +57,14 @@ class StreamHealth:
 
     @property
     def rate_hz(self) -> float | None:
-        """Usable images per second of late."""
+        """Recent usable images per second."""
         if len(self._arrivals_s) < 2:
             return None
         passed_s = self._arrivals_s[-1] - self._arrivals_s[0]
         return (len(self._arrivals_s) - 1) / passed_s if passed_s > 0 else None
 
-    def finding(self, now_s: float, publishers: int, stalled_after_s: float) -> Finding:
-        """Return how the stream is at `now_s` with that many publishers on its topic."""
+    def status(self, now_s: float, publishers: int, stalled_after_s: float) -> StreamStatus:
+        """Return the status at `now_s`, with that many publishers on the topic."""
         values: dict[str, object] = {"received": self.received, "refused": self.refused}
         if self.rate_hz is not None:
             values["rate_hz"] = self.rate_hz
@@ -76,11 +76,11 @@ class StreamHealth:
         if silent_s > stalled_after_s or not self.received:
             since = "for" if self.received else "since the start,"
             silent_s = silent_s if self.received else now_s - self._started_s
-            why = "" if publishers else " (nobody publishes it)"
-            sentence = f"{self.topic}: no image {since} {silent_s:.1f} s{why}"
-            return Finding(not self.received and silent_s <= stalled_after_s, sentence, values)
+            why = "" if publishers else " (the topic has no publisher)"
+            message = f"{self.topic}: no image {since} {silent_s:.1f} s{why}"
+            return StreamStatus(not self.received and silent_s <= stalled_after_s, message, values)
         if self._refusal is not None:
-            return Finding(False, f"{self.topic}: {self._refusal}", values | {"publishers": publishers})
+            return StreamStatus(False, f"{self.topic}: {self._refusal}", values | {"publishers": publishers})
         if publishers > 1:
-            return Finding(False, f"{self.topic}: {publishers} publishers, there must be one", values)
-        return Finding(True, f"{self.topic}: {self.rate_hz or 0.0:.1f} Hz", values)
+            return StreamStatus(False, f"{self.topic} must have one publisher: got {publishers}", values)
+        return StreamStatus(True, f"{self.topic}: {self.rate_hz or 0.0:.1f} Hz", values)

@@ -12,30 +12,36 @@ from vergence_common.images import array_to_image
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
+from vergence_metric.alignment.parameters import AlignmentParameters
+from vergence_metric.disparity.angular_disparity import angular_disparity
+from vergence_metric.disparity.parameters import DisparityParameters
+from vergence_metric.edges.parameters import ContrastParameters, EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.measurement.overlay import draw_overlay
 from vergence_metric.measurement.pair_measurement import Models, PairMeasurement
-from vergence_metric.measurement.parameters import GROUPS, EdgeMetricNodeParameters
+from vergence_metric.measurement.parameters import GROUPS, PairMeasurementParameters, VergedParameters
 from vergence_metric.pairs.latest_worker import LatestWorker
-from vergence_metric.pairs.viewing_angles import angular_disparity
-from vergence_metric.ros.metric_messages import edge_message, error_message, track_message
-from vergence_metric.ros.pair_node import PairNode
+from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
+from vergence_metric.ros.edge_messages import edge_message, error_message
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
+from vergence_metric.ros.stereo_node import StereoNode
+from vergence_metric.ros.track_messages import track_message
+from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
 from vergence_rig.rig import load_rig
 
-_GLANCED_BACK_NS = 500_000_000
+_JOINT_SAMPLES_NS = 500_000_000  # longer than two pairs can be apart while the tracker still follows
 
 
-class EdgeMetricNode(PairNode):
-    """Measures the newest pair on a thread of its own; the executor's thread only takes images and pairs them."""
+class EdgeMetricNode(StereoNode):
+    """Measures the newest pair on its own thread; the executor's thread only receives images and pairs them."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("edge_metric_node", **options)
         self._settings = declare(self, GROUPS)
-        settings: EdgeMetricNodeParameters = self._settings.value
-        cv2.setNumThreads(settings.threads or -1)
-        self._measurement = PairMeasurement(settings, load_rig(settings.rig))
+        stereo = self._settings.get(StereoParameters)
+        cv2.setNumThreads(stereo.threads or -1)
+        self._measurement = PairMeasurement(_measurement_parameters(self._settings), load_rig(stereo.rig))
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
         self._edge_publisher = qos.create_publisher(EdgeVergence, "vergence/edge")
@@ -43,17 +49,19 @@ class EdgeMetricNode(PairNode):
         self._track_publisher = qos.create_publisher(TargetTrack, "vergence/track")
         self._overlay_publisher = qos.create_publisher(Image, "vergence/overlay", IMAGE_QOS)
         self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
-        self._stereo = StereoInput(self, settings, diagnostics, qos, self._worker.submit)
+        pairing = self._settings.get(PairingParameters)
+        self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit)
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self._settings.on_change(self._on_settings)
         diagnostics.add("measurement", self._report)
 
     def _on_settings(self, settings: ParameterSet) -> None:
-        cv2.setNumThreads(settings.value.threads or -1)
-        self._stereo.set_parameters(settings.value)
+        stereo = settings.get(StereoParameters)
+        cv2.setNumThreads(stereo.threads or -1)
+        self._stereo.set_parameters(stereo, settings.get(PairingParameters))
 
     def _measure(self, pair: ImagePair) -> None:
-        self._measurement.set_parameters(self._settings.value)
+        self._measurement.set_parameters(_measurement_parameters(self._settings))
         header, skew_s = pair.left.header, pair.skew_ns * 1e-9
         models = self._stereo.models_for(pair.left.pixels)
         with self._times.measure("metric"):
@@ -75,16 +83,18 @@ class EdgeMetricNode(PairNode):
             with self._times.measure("overlay"):
                 picture = draw_overlay(pair.left.pixels, edge, disparity)
                 self._overlay_publisher.publish(array_to_image(picture, header))
-        self._measurement.settle()
+        self._measurement.update_alignment()
         self._failure = None
 
     def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, models: Models | None) -> None:
         with self._times.measure("tracker"):
             now_ns = pair.left_stamp_ns
             eyes = self._joints.at(now_ns, pair.right_stamp_ns)
-            told = self._joints.told_between(now_ns - _GLANCED_BACK_NS, now_ns)
-            on_the_way = [(stamp_ns * 1e-9, angles) for stamp_ns, angles in told]
-            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models, on_the_way)
+            samples = [
+                (stamp_ns * 1e-9, angles)
+                for stamp_ns, angles in self._joints.samples_between(now_ns - _JOINT_SAMPLES_NS, now_ns)
+            ]
+            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models, samples)
         angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
         self._track_publisher.publish(track_message(track, edge, angular, pair.left.header, pair.skew_ns * 1e-9))
 
@@ -93,10 +103,21 @@ class EdgeMetricNode(PairNode):
         values: dict[str, object] = {"measured": worked, "dropped": dropped}
         values |= self._stereo.decode_times.summary() | self._times.summary()
         if self._failure is not None:
-            return Report(ERROR, f"the last pair could not be measured: {self._failure}", values)
+            return Report(ERROR, f"measuring the last pair failed: {self._failure}", values)
         if dropped:
-            return Report(WARN, f"too slow: {dropped} of {worked + dropped} pairs were left out", values)
+            return Report(WARN, f"measuring is too slow: {dropped} of {worked + dropped} pairs were dropped", values)
         return Report(OK, f"{worked} pairs measured", values)
+
+
+def _measurement_parameters(settings: ParameterSet) -> PairMeasurementParameters:
+    return PairMeasurementParameters(
+        settings.get(EdgeParameters),
+        settings.get(ContrastParameters),
+        settings.get(AlignmentParameters),
+        settings.get(VergedParameters),
+        settings.get(DisparityParameters),
+        settings.get(TrackerParameters),
+    )
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -1,4 +1,4 @@
-"""The image messages of both eyes become pairs of arrays; shared by every node that measures pairs."""
+"""Image messages of both eyes to pairs of arrays; shared by the nodes that measure pairs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,20 +19,20 @@ from vergence_common.images import ImageError, compressed_to_array, image_to_arr
 from vergence_common.qos import IMAGE_QOS, QosWatch
 from vergence_common.stamps import to_nanoseconds
 from vergence_metric.pairs.pairing import LEFT, RIGHT, Pair, StereoPairer
+from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.pairs.stage_times import StageTimes
-from vergence_metric.pairs.stereo_parameters import StereoParameters
-from vergence_metric.pairs.stream_health import Finding, StreamHealth
-from vergence_rig.camera import CameraError, CameraModel
+from vergence_metric.pairs.stream_health import StreamHealth
+from vergence_rig.camera import CameraModel, CameraModelError
 
 SIDES = ("left", "right")
 
-# A camera's description is small and repeated with every image: best effort fits every publisher.
+# camera_info is small and repeated with every image; best effort is compatible with every publisher.
 _INFO_QOS = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
 
 
 @dataclass(frozen=True, slots=True)
 class ImageFrame:
-    """One eye's image: its header, its pixels (h, w, 3) BGR or (h, w) grey uint8, and when it came [ns, monotonic]."""
+    """One eye's image: header, pixels (h, w, 3) BGR or (h, w) grey uint8, and time of arrival [ns, monotonic]."""
 
     header: Header
     pixels: npt.NDArray[np.uint8]
@@ -44,36 +44,37 @@ ImagePair = Pair[ImageFrame]
 
 @dataclass(frozen=True, slots=True)
 class _Undecoded:
-    """One eye's image as it came."""
+    """One eye's image message and its time of arrival [ns, monotonic]."""
 
     message: Any
     arrived_ns: int
 
 
 class StereoInput:
-    """Subscribes both eyes, gives every pair of images of one size to `on_pair`, and reports on all of it.
+    """Subscribes both eyes, passes each pair of images of equal size to `on_pair`, and adds diagnostics of the input.
 
     `on_pair` runs in the executor's thread and should only hand the pair on. `models` holds the left and the right
-    camera as camera_info describes them, None before. With `wanted`, only
-    pairs whose left stamp [ns] it wants are decoded, and then both images at once; the others only count as received.
+    camera model by camera_info, None before the first. With `is_due`, only pairs for whose left stamp [ns] it is true
+    are decoded; the others only count as received.
     """
 
     def __init__(
         self,
         node: Node,
-        parameters: StereoParameters,
+        stereo: StereoParameters,
+        pairing: PairingParameters,
         diagnostics: Diagnostics,
         qos: QosWatch,
         on_pair: Callable[[ImagePair], None],
-        wanted: Callable[[int], bool] | None = None,
+        is_due: Callable[[int], bool] | None = None,
     ) -> None:
         self.models: list[CameraModel | None] = [None, None]
         self.decode_times = StageTimes()
         self._node = node
-        self._parameters = parameters
+        self._stereo, self._pairing = stereo, pairing
         self._on_pair = on_pair
-        self._wanted = wanted
-        self._pairer: StereoPairer[Any] = StereoPairer(parameters)
+        self._is_due = is_due
+        self._pairer: StereoPairer[Any] = StereoPairer(pairing)
         self._size_mismatch: str | None = None
         self._size_mismatches = 0
         self._info_errors: list[str | None] = [None, None]
@@ -81,7 +82,7 @@ class StereoInput:
         self._deadline = node.create_timer(
             1.0, self._on_deadline, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False
         )
-        compressed = parameters.image_transport == "compressed"
+        compressed = stereo.image_transport == "compressed"
         message_type, suffix = (CompressedImage, "image_raw/compressed") if compressed else (Image, "image_raw")
         self._to_pixels: Callable[[Any], npt.NDArray[np.uint8]] = compressed_to_array if compressed else image_to_array
         self._health = tuple(StreamHealth(f"{name}/{suffix}", monotonic()) for name in SIDES)
@@ -93,10 +94,10 @@ class StereoInput:
         diagnostics.add("pairs", self._pairs_report)
         diagnostics.add("cameras", self._cameras_report)
 
-    def set_parameters(self, parameters: StereoParameters) -> None:
-        """Pair by these from the next image on; the transport stays as it is."""
-        self._parameters = parameters
-        self._pairer.set_parameters(parameters)
+    def set_parameters(self, stereo: StereoParameters, pairing: PairingParameters) -> None:
+        """Use these from the next image on; the transport stays as it is."""
+        self._stereo, self._pairing = stereo, pairing
+        self._pairer.set_parameters(pairing)
 
     def _subscribe(
         self, qos: QosWatch, kind: Any, topic: str, callback: Callable[[int, Any], None], side: int, profile: QoSProfile
@@ -111,15 +112,15 @@ class StereoInput:
         health = self._health[side]
         stamp_ns = to_nanoseconds(message.header.stamp)
         age_s = (self._node.get_clock().now().nanoseconds - stamp_ns) * 1e-9
-        if self._wanted is not None:
-            health.pass_over(now_ns * 1e-9, age_s)
-            self._give(self._pairer.add(side, stamp_ns, _Undecoded(message, now_ns), now_ns))
+        if self._is_due is not None:
+            health.count(now_ns * 1e-9, age_s)
+            self._emit(self._pairer.add(side, stamp_ns, _Undecoded(message, now_ns), now_ns))
             return
         frame = self._decoded(side, message, now_ns)
         if frame is None:
             return
         health.accept(now_ns * 1e-9, age_s, (frame.pixels.shape[1], frame.pixels.shape[0]))
-        self._give(self._pairer.add(side, stamp_ns, frame, now_ns))
+        self._emit(self._pairer.add(side, stamp_ns, frame, now_ns))
 
     def _decoded(self, side: int, message: Any, arrived_ns: int) -> ImageFrame | None:
         health = self._health[side]
@@ -132,9 +133,9 @@ class StereoInput:
             return None
 
     def _decoded_pair(self, pair: Pair[Any]) -> ImagePair | None:
-        if self._wanted is None:
+        if self._is_due is None:
             return pair
-        if not self._wanted(pair.left_stamp_ns):
+        if not self._is_due(pair.left_stamp_ns):
             return None
         left, right = (
             self._decoded(side, frame.message, frame.arrived_ns) for side, frame in enumerate((pair.left, pair.right))
@@ -142,14 +143,14 @@ class StereoInput:
         if left is None or right is None:
             return None
         for health, frame in zip(self._health, (left, right), strict=True):
-            health.looked_into((frame.pixels.shape[1], frame.pixels.shape[0]))
+            health.decoded((frame.pixels.shape[1], frame.pixels.shape[0]))
         return Pair(left, right, pair.left_stamp_ns, pair.right_stamp_ns)
 
     def _on_deadline(self) -> None:
         self._deadline.cancel()
-        self._give(self._pairer.expire(monotonic_ns()))
+        self._emit(self._pairer.expire(monotonic_ns()))
 
-    def _give(self, pairs: list[Pair[Any]]) -> None:
+    def _emit(self, pairs: list[Pair[Any]]) -> None:
         deadline_ns = self._pairer.deadline_ns
         if deadline_ns is not None:
             self._deadline.timer_period_ns = max(deadline_ns - monotonic_ns(), 1)
@@ -158,7 +159,7 @@ class StereoInput:
             left, right = pair.left.pixels.shape, pair.right.pixels.shape
             if left[:2] != right[:2]:
                 self._size_mismatch = (
-                    f"left images are {left[1]}x{left[0]}, right ones {right[1]}x{right[0]}: they must be alike"
+                    f"left and right images must have one size: got {left[1]}x{left[0]} and {right[1]}x{right[0]}"
                 )
                 self._size_mismatches += 1
                 continue
@@ -173,12 +174,12 @@ class StereoInput:
         try:
             self.models[side] = CameraModel.from_camera_info_values(*seen)
             self._info_errors[side] = None
-        except CameraError as error:
+        except CameraModelError as error:
             self.models[side] = None
             self._info_errors[side] = str(error)
 
     def models_for(self, pixels: npt.NDArray[np.uint8]) -> tuple[CameraModel, CameraModel] | None:
-        """Return both camera models if they are known and are for images of this size."""
+        """Return both camera models if camera_info has described them for images of this size, else None."""
         left, right = self.models[LEFT], self.models[RIGHT]
         if left is None or right is None:
             return None
@@ -190,9 +191,9 @@ class StereoInput:
     def _stream_report(self, side: int) -> Report:
         health = self._health[side]
         publishers = self._node.count_publishers(self._node.resolve_topic_name(health.topic))
-        found = health.finding(monotonic(), publishers, self._parameters.stalled_after_s)
+        status = health.status(monotonic(), publishers, self._stereo.stalled_after_s)
         late = self._pairer.statistics.late[side]
-        return _report(found, ERROR, {"out_of_order": late})
+        return Report(OK if status.ok else ERROR, status.message, status.values | {"out_of_order": late})
 
     def _pairs_report(self) -> Report:
         counts = self._pairer.statistics
@@ -208,11 +209,11 @@ class StereoInput:
             values["skew_largest_ms"] = counts.skew_largest_s * 1e3
         if self._size_mismatch is not None:
             return Report(ERROR, self._size_mismatch, values)
-        complaint = counts.complaint(self._parameters.pair_slop_s)
+        complaint = counts.complaint(self._pairing.slop_s)
         if complaint is not None:
             return Report(ERROR, complaint, values)
         if counts.pairs == 0:
-            return Report(WARN, "no pair yet", values)
+            return Report(WARN, "no pair of images yet", values)
         return Report(OK, f"{counts.pairs} pairs", values)
 
     def _cameras_report(self) -> Report:
@@ -221,15 +222,9 @@ class StereoInput:
                 return Report(ERROR, f"{name}/camera_info: {self._info_errors[side]}")
             model, size = self.models[side], self._health[side].size_px
             if model is None:
-                return Report(WARN, f"{name}/camera_info: none yet, angles are NaN")
+                return Report(WARN, f"{name}/camera_info: no message yet; angles are NaN")
             if size is not None and (model.width_px, model.height_px) != size:
-                return Report(
-                    ERROR,
-                    f"{name}/camera_info is for {model.width_px}x{model.height_px}, images are {size[0]}x{size[1]}: "
-                    "angles are NaN",
-                )
-        return Report(OK, "both cameras are described")
-
-
-def _report(found: Finding, level: int, more: dict[str, object]) -> Report:
-    return Report(OK if found.fine else level, found.sentence, found.values | more)
+                got = f"{model.width_px}x{model.height_px}"
+                needed = f"{size[0]}x{size[1]}"
+                return Report(ERROR, f"{name}/camera_info must be for {needed} images: got {got}; angles are NaN")
+        return Report(OK, "camera_info received from both cameras")

@@ -1,16 +1,16 @@
-"""Where the followed target is, as TargetTrack.msg tells it."""
+"""The state of the followed target in one pair; the fields of TargetTrack.msg."""
 
 import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-from vergence_metric.tracking.saccade_detector import Pixel
+from vergence_metric.tracking.eye_view import Pixel
 
 NOWHERE: Pixel = (math.nan, math.nan)
 
 
 class TrackStatus(IntEnum):
-    """The numbers are those of TargetTrack.msg."""
+    """State of the track; the values are those of TargetTrack.msg."""
 
     OK = 0
     LOCKING = 1
@@ -21,11 +21,11 @@ class TrackStatus(IntEnum):
 
 @dataclass(frozen=True)
 class Track:
-    """Where the target is; the fields are those of TargetTrack.msg, NaN where unknown.
+    """Position of the target in one pair; the fields are those of TargetTrack.msg, NaN where unknown.
 
     `left_px`, `right_px` (x, y) in the images given, `disparity_px` = x_left - x_right, `extent_px` (width, height) of
-    the region locked on at its present scale. `confidence` is the likeness of the target to itself, lowered where its
-    disparity could not be confirmed.
+    the locked region at its present scale. `confidence` is the similarity to the target's appearance, lowered where the
+    disparity could not be measured.
     """
 
     track_id: int
@@ -42,6 +42,6 @@ class Track:
 
     @classmethod
     def nowhere(cls, track_id: int, status: TrackStatus, reason: str, lock_stamp_s: float = math.nan) -> "Track":
-        """Return that the target is not seen, and why."""
+        """Return the track of a target that is not visible, with the reason."""
         nan = math.nan
         return cls(track_id, lock_stamp_s, NOWHERE, NOWHERE, nan, nan, nan, NOWHERE, 0.0, status, reason)

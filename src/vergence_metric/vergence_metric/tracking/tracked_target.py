@@ -1,4 +1,4 @@
-"""The target that the tracker holds: where it should be next, and at which disparity, however the eyes turn."""
+"""The locked target: prediction of its direction and disparity, independent of the motion of the eyes."""
 
 import itertools
 import math
@@ -7,34 +7,34 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vergence_metric.tracking.appearance import Appearance
-from vergence_metric.tracking.saccade_detector import EyeView, Pixel
+from vergence_metric.tracking.eye_view import EyeView, Pixel
+from vergence_metric.tracking.target_appearance import TargetAppearance
 
 _MOTION_MEMORY = 0.6  # share of the old angular velocity kept at each frame
 _COAST_HALF_LIFE_S = 0.7  # a hidden target's predicted velocity fades: it may have stopped
-_COAST_FROM_S = 0.3  # a hidden target goes on as it went over this time, not as its last two sightings had it
+_COAST_FROM_S = 0.3  # a hidden target is predicted by its velocity over this time, not by its last two sightings
 _SLOPE_OVER_S = 0.06
 
 
 @dataclass
 class Target:
-    """What is known of the locked target, in directions of rig_base, so that turning eyes change nothing."""
+    """State of the locked target, in directions of rig_base, which do not change when the eyes move."""
 
     track_id: int
     lock_stamp_s: float
-    looks: Appearance
+    appearance: TargetAppearance
     seen_s: float
     direction: np.ndarray  # unit vector in rig_base when last seen
     velocity: np.ndarray  # of that vector, per second
-    bounded: bool  # its region was told from what is around
-    aside_px: Pixel = (0.0, 0.0)  # of its region's centre, when locked on: where the eye looked
+    bounded: bool  # its region was segmented
+    aside_px: Pixel = (0.0, 0.0)  # from its region's centre to the fovea when locked on
     hidden: bool = False
     right_seen_s: float = -math.inf
-    absolute_rad: float = math.nan  # angle by which the right ray is turned against the left one, across
-    sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # of late: stamp and direction
+    parallax_rad: float = math.nan  # angle from the left eye's ray to the right eye's, in the plane of the baseline
+    sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # recent stamps and directions
 
     def predicted(self, stamp_s: float) -> np.ndarray:
-        """Return the direction (3,) in which it should be seen now."""
+        """Return the predicted direction (3,) at a stamp."""
         elapsed = stamp_s - self.seen_s
         rate = math.log(2.0) / _COAST_HALF_LIFE_S
         if self.hidden:
@@ -43,8 +43,8 @@ class Target:
             direction = self.direction + self.velocity * elapsed
         return np.asarray(direction / np.linalg.norm(direction))
 
-    def moved(self, stamp_s: float, direction: np.ndarray) -> None:
-        """Take where it is seen now."""
+    def update_direction(self, stamp_s: float, direction: np.ndarray) -> None:
+        """Update direction and velocity with a sighting."""
         elapsed = stamp_s - self.seen_s
         if self.hidden:
             self.sightings.clear()
@@ -59,35 +59,35 @@ class Target:
             self.sightings.popleft()
 
     def _steady_velocity(self) -> np.ndarray:
-        """Return its velocity over the last sightings (3,), whatever single ones say (Theil and Sen's median slope).
+        """Return the velocity (3,) over the recent sightings, robust to single ones (Theil-Sen median slope).
 
-        Eyes that turn fast are not quite where their joints say, and what hides a target pulls at it first.
+        While the eyes move fast their joint angles are less exact, and an occluder first shifts the measured position.
         """
         pairs = itertools.combinations(self.sightings, 2)
         slopes = [(b - a) / (t - s) for (s, a), (t, b) in pairs if t - s >= _SLOPE_OVER_S]
         return np.median(slopes, axis=0) if slopes else np.zeros(3)
 
-    def looked_at(self, center_px: Pixel) -> Pixel:
-        """Return the pixel of the point that the eye looked at when it locked on, for a centre now."""
-        scale = self.looks.scale
+    def fixated_px(self, center_px: Pixel) -> Pixel:
+        """Return the pixel of the point that was fixated at the lock, for the present centre."""
+        scale = self.appearance.scale
         return center_px[0] + scale * self.aside_px[0], center_px[1] + scale * self.aside_px[1]
 
-    def saw_right(self, stamp_s: float, left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> None:
-        """Keep its parallax, the angle between the two eyes' rays, which changes slowly whatever the eyes do."""
+    def update_parallax(self, stamp_s: float, left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> None:
+        """Update the parallax, the angle between the two eyes' rays, which does not depend on the eyes' motion."""
         self.right_seen_s = stamp_s
-        self.absolute_rad = _across(views[1].direction(right_px)) - _across(views[0].direction(left_px))
+        self.parallax_rad = _across(views[1].direction(right_px)) - _across(views[0].direction(left_px))
 
     def disparity_age_s(self, stamp_s: float) -> float:
-        """Return how long ago it was last seen in the right eye."""
+        """Return the time since the target was last matched in the right eye [s]."""
         return stamp_s - self.right_seen_s
 
     def expected_disparity(self, left_px: Pixel, views: tuple[EyeView, EyeView]) -> float | None:
-        """Return the disparity it should have at a left pixel with the eyes as they are, None if never measured."""
-        if math.isnan(self.absolute_rad):
+        """Return the predicted disparity at a left pixel with the eyes in `views`, None if never measured."""
+        if math.isnan(self.parallax_rad):
             return None
         left = views[0].direction(left_px)
-        angle = _across(left) + self.absolute_rad
-        # Same elevation about the baseline, turned across by the parallax.
+        angle = _across(left) + self.parallax_rad
+        # Same elevation about the baseline, rotated by the parallax.
         forward = left * np.array([1.0, 0.0, 1.0])
         forward /= np.linalg.norm(forward)
         right = forward * math.cos(angle) + np.array([0.0, math.sin(angle), 0.0])
@@ -96,5 +96,5 @@ class Target:
 
 
 def _across(direction: np.ndarray) -> float:
-    """Return a direction's angle across, towards the left, in the plane through the baseline [rad]."""
+    """Return a direction's angle in the plane of the baseline, towards the left [rad]."""
     return math.asin(min(max(float(direction[1]), -1.0), 1.0))

@@ -1,8 +1,8 @@
-"""The zero-disparity filter: what lies at one disparity, as a mask, a centroid and an extent.
+"""The zero-disparity filter: the region at one disparity, as a mask, a centroid and an extent.
 
 After Coombs and Brown, "Real-time binocular smooth pursuit" (1993): the features whose disparity is that of the
 fixation point belong to the target, whatever it is. A feature here is a pixel with enough gradient about it; it passes
-if the two images agree there better at the asked disparity than at those around it. The mask is closed between the
+if the two images match there better at the given disparity than at those around it. The mask is closed between the
 features and taken as one connected region at the fovea.
 """
 
@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from vergence_metric.disparity.fovea_pair import cut
 from vergence_metric.disparity.protocol import Image
 
-_WINDOW_PX = 9  # over which agreement is averaged
-_GUARD_PX = 4  # disparities tried beyond the tolerance on both sides
+_WINDOW_PX = 9  # over which differences are averaged
+_GUARD_PX = 4  # disparities compared beyond the tolerance on both sides
 _LOCAL_MEAN_PX = 8.0
 _MINIMUM_GRADIENT = 4.0  # grey levels per pixel, averaged over the window
-_ADVANTAGE = 0.85  # the best disparity outside must fit this much worse
-_LEFT_OVER = 0.5  # share of the local contrast that a match may leave; unrelated patches leave about 1.4
+_ADVANTAGE = 0.85  # ratio to the best disparity outside, at most
+_MAX_RESIDUAL = 0.5  # of a match, as a share of the local contrast; unrelated patches have about 1.4
 _NOISE = 2.0  # grey levels, mean absolute difference
 _CLOSING_PX = 11
-_OPENING_PX = 7  # thinner outgrowths are chance
+_OPENING_PX = 7  # thinner outgrowths are noise
 _MINIMUM_AREA_PX = 40
 
 
@@ -33,8 +33,8 @@ class ZeroDisparity:
     """The region at one disparity.
 
     `mask` (h, w) bool covers an area of the left image whose top-left pixel is `origin_px`. `centroid_px` (x, y) and
-    `extent_px` (width and height of the rectangle that spreads alike) are in the left image, NaN if there is no region.
-    `features` counts the pixels that passed, `touches_border` that the region may reach beyond what was looked at.
+    `extent_px` (sides of the rectangle of equal second moments) are in the left image, NaN if there is no region.
+    `features` counts the pixels that passed; `touches_border`: the region may extend beyond the area.
     """
 
     mask: NDArray[np.bool_]
@@ -47,7 +47,7 @@ class ZeroDisparity:
 
     @property
     def found(self) -> bool:
-        """True if something lies at the disparity."""
+        """True if there is a region at the disparity."""
         return self.area_px > 0
 
 
@@ -65,11 +65,11 @@ def zero_disparity(
     Args:
         left: (h, w) grey image of the left eye.
         right: (h, w) grey image of the right eye, aligned.
-        center_px: (x, y) about which to look; None for the image's centre.
-        disparity_px: horizontal and vertical disparity asked for, rounded to whole pixels.
-        tolerance_px: what differs by up to this belongs to it.
-        half_side_px: half the side of the area looked at.
-        reach_px: the region must come this near to the point, else there is none.
+        center_px: (x, y) of the area's centre; None for the image's centre.
+        disparity_px: horizontal and vertical disparity, rounded to whole pixels.
+        tolerance_px: largest difference from the disparity within the region.
+        half_side_px: half the side of the area.
+        reach_px: largest distance of the region from the centre.
 
     """
     height, width = left.shape
@@ -83,7 +83,7 @@ def zero_disparity(
     agreement, beside = _costs(flat_left, flat_right, tolerance_px, spread)
     gradient = cv2.boxFilter(np.abs(cv2.Sobel(flat_left, cv2.CV_32F, 1, 0, scale=0.125)), -1, (_WINDOW_PX, _WINDOW_PX))
     contrast = cv2.boxFilter(np.abs(flat_left), -1, (_WINDOW_PX, _WINDOW_PX))
-    passed = (agreement < _ADVANTAGE * beside) & (agreement < _LEFT_OVER * contrast + _NOISE)
+    passed = (agreement < _ADVANTAGE * beside) & (agreement < _MAX_RESIDUAL * contrast + _NOISE)
     passed &= gradient > _MINIMUM_GRADIENT / 2
     passed &= _inside(x0, y0, d, side, width, height)
     return _region(passed, (x0, y0), (x, y), reach_px)
@@ -99,7 +99,7 @@ def _costs(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the smallest mean absolute difference within the tolerance, and that outside of it, for each pixel."""
     width = left.shape[1]
-    # The two eyes' gains differ; a fixed gain for the whole area keeps the differences comparable.
+    # The eyes' gains differ; one gain for the whole area keeps the differences comparable.
     gain = float(left.std() / max(right.std(), 1e-3))
     scaled = right * min(max(gain, 0.5), 2.0)
     inner = np.full(left.shape, np.inf, np.float32)
@@ -128,7 +128,7 @@ def _region(
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_CLOSING_PX, _CLOSING_PX))
     small = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
     opened = cv2.morphologyEx(passed.astype(np.uint8), cv2.MORPH_OPEN, small)
-    # The closing must not stick to the border of the area, so it is done with room around.
+    # Padded, so that the closing does not attach to the border of the area.
     padded = cv2.copyMakeBorder(opened, *(_CLOSING_PX,) * 4, cv2.BORDER_CONSTANT, value=0)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, disc)[_CLOSING_PX:-_CLOSING_PX, _CLOSING_PX:-_CLOSING_PX]
     count, labels, stats, _ = cv2.connectedComponentsWithStats(np.ascontiguousarray(closed), connectivity=4)
@@ -165,12 +165,12 @@ def _region(
 
 
 def _side(coordinates: NDArray[np.intp]) -> float:
-    """Return the side of the uniform bar that spreads like these: what sticks out of a region hardly adds to it."""
+    """Return the side of the uniform bar of equal variance; thin outgrowths of a region hardly add to it."""
     return math.sqrt(12.0 * float(coordinates.var()) + 1.0)
 
 
 def _trimmed(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the largest part that is left when thin outgrowths are cut off."""
+    """Return the largest part that is left after removing thin outgrowths."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_OPENING_PX, _OPENING_PX))
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=4)
@@ -180,7 +180,7 @@ def _trimmed(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the mask with its holes filled: what the background cannot reach."""
+    """Return the mask with its holes filled."""
     padded = cv2.copyMakeBorder(mask.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     outside = padded.copy()
     cv2.floodFill(outside, None, (0, 0), 2)

@@ -1,4 +1,4 @@
-"""What the nodes that measure pairs of images share: the joints' history, and a thread whose failures are told."""
+"""Base of the nodes that measure pairs of images: joint history, stage times, and the report of a failed pair."""
 
 import traceback
 from typing import Any
@@ -7,13 +7,13 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from vergence_common.stamps import to_nanoseconds
-from vergence_metric.pairs.joint_history import JointHistory
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.stage_times import StageTimes
+from vergence_rig.joint_history import JointHistory
 
 
-class PairNode(Node):
-    """Measures pairs on a thread of its own; `_worker` is the heir's, which clears `_failure` after a good pair."""
+class StereoNode(Node):
+    """Measures pairs on its own thread. Subclasses must set `_worker`, and clear `_failure` after a measured pair."""
 
     _worker: LatestWorker[Any]
 
@@ -35,4 +35,4 @@ class PairNode(Node):
             return  # shut down while a pair was being measured
         self._failure = f"{type(error).__name__}: {error}"
         text = "".join(traceback.format_exception(error))
-        self.get_logger().error(f"a pair could not be measured:\n{text}", throttle_duration_sec=10.0)
+        self.get_logger().error(f"measuring a pair failed:\n{text}", throttle_duration_sec=10.0)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_metric.pairs.viewing_angles import angular_disparity
+from vergence_metric.disparity.angular_disparity import angular_disparity
 from vergence_rig.camera import CameraModel
 
 D = (-0.2, 0.06, 0.001, -0.0005, 0.0)

@@ -1,6 +1,5 @@
-"""Follow one thing by its looks in one eye: sparse flow from frame to frame, templates against drift."""
+"""Appearance of the target in one eye: sparse optical flow from frame to frame, templates against drift."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,39 +9,39 @@ from numpy.typing import NDArray
 
 from vergence_metric.disparity.fovea_pair import cut
 from vergence_metric.disparity.protocol import Image
-from vergence_metric.tracking.saccade_detector import Pixel
+from vergence_metric.tracking.eye_view import Pixel
 
-_SMALLEST_HALF_PX = 9
-_LARGEST_HALF_PX = 32
-_MOST_FEATURES = 40
-_FEWEST_FEATURES = 6
+_MIN_HALF_PX = 9
+_MAX_HALF_PX = 32
+_MAX_FEATURES = 40
+_MIN_FEATURES = 6
 _FLOW_MARGIN_PX = 40
 _ROUND_TRIP_PX = 0.7
 _OUTLIER_PX = 2.5
 _REANCHOR_PX = 7
 _REANCHOR_SHARE = 0.4
-_GOOD_LIKENESS = 0.85
-_LIKENESS_FOR_FEATURES = 0.7
-_LARGEST_SCALE_STEP = 0.08
+_GOOD_SIMILARITY = 0.85
+_MIN_SIMILARITY_FOR_FEATURES = 0.7
+_MAX_SCALE_STEP = 0.08
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """Where the thing is [px], how like itself it looks (correlation, -1..1) and how many features moved with it."""
+    """Position of the target [px], similarity to its appearance (correlation, -1..1), number of features followed."""
 
     pixel: Pixel
-    likeness: float
+    similarity: float
     features: int
 
 
-class Appearance:
-    """The looks of what was locked on; pixels are (x, y) of the left image."""
+class TargetAppearance:
+    """Model of the target's appearance; pixels are (x, y) of the left image."""
 
     def __init__(self, image: Image, pixel: Pixel, extent_px: tuple[float, float]) -> None:
-        """Learn it from the image it was locked on in; `extent_px` (width, height) bounds what belongs to it."""
+        """Learn the target at a pixel of an image; `extent_px` (width, height) bounds it."""
         self.extent_px = extent_px
         self.scale = 1.0
-        self._half = tuple(round(min(max(e / 2, _SMALLEST_HALF_PX), _LARGEST_HALF_PX)) for e in extent_px)
+        self._half = tuple(round(min(max(e / 2, _MIN_HALF_PX), _MAX_HALF_PX)) for e in extent_px)
         self._first = self._patch(image, pixel)
         self._recent = self._first
         self._previous = image
@@ -61,49 +60,49 @@ class Appearance:
         )
 
     def _find_features(self, image: Image) -> NDArray[np.float32]:
-        half = [max(_SMALLEST_HALF_PX, min(round(0.45 * e * self.scale), 60)) for e in self.extent_px]
+        half = [max(_MIN_HALF_PX, min(round(0.45 * e * self.scale), 60)) for e in self.extent_px]
         x0, y0 = round(self.pixel[0]) - half[0], round(self.pixel[1]) - half[1]
         area = cut(image, x0, y0, 2 * half[0] + 1, 2 * half[1] + 1)
-        found = cv2.goodFeaturesToTrack(area, _MOST_FEATURES, 0.03, 4, blockSize=5)
+        found = cv2.goodFeaturesToTrack(area, _MAX_FEATURES, 0.03, 4, blockSize=5)
         if found is None:
             return np.empty((0, 2), np.float32)
         return np.asarray(found, np.float32).reshape(-1, 2) + np.array([x0, y0], np.float32)
 
     def follow(self, image: Image, expected_px: Pixel) -> Sighting:
-        """Find it in the next image, where it is expected about `expected_px`; does not move until `accept`."""
+        """Return the target's position in the next image near `expected_px`; the state changes only by `accept`."""
         moved, carried, step = self._flow(image, expected_px)
-        place = expected_px if moved is None else moved
+        pixel = expected_px if moved is None else moved
         reach = _REANCHOR_PX if moved is not None else 3 * _REANCHOR_PX
-        anchored, likeness = self._anchor(image, place, reach)
+        anchored, similarity = self._anchor(image, pixel, reach)
         if moved is None:
-            place = anchored
-        elif likeness > 0.5:
+            pixel = anchored
+        elif similarity > 0.5:
             share = _REANCHOR_SHARE
-            place = tuple(m + share * (a - m) for m, a in zip(moved, anchored, strict=True))  # type: ignore[assignment]
+            pixel = tuple(m + share * (a - m) for m, a in zip(moved, anchored, strict=True))  # type: ignore[assignment]
         self._carried, self._step = carried, step
-        return Sighting((float(place[0]), float(place[1])), likeness, len(carried))
+        return Sighting((float(pixel[0]), float(pixel[1])), similarity, len(carried))
 
     def search(self, image: Image, expected_px: Pixel, reach_px: int) -> Sighting:
-        """Look for it by its looks alone within reach of where it is expected."""
+        """Return the target's most similar position within reach of the expected one, by template alone."""
         self._carried, self._step = np.empty((0, 2), np.float32), 1.0
-        place, likeness = self._anchor(image, expected_px, reach_px)
-        return Sighting(place, likeness, 0)
+        pixel, similarity = self._anchor(image, expected_px, reach_px)
+        return Sighting(pixel, similarity, 0)
 
     def accept(self, image: Image, sighting: Sighting, renew: bool) -> None:
-        """Take a sighting as the truth; `renew` also takes its looks as the recent ones."""
+        """Accept a sighting as the target's position; `renew` also updates the recent template."""
         self.pixel = sighting.pixel
         self.scale *= self._step
         self._features = self._carried
-        if renew and sighting.likeness > _GOOD_LIKENESS:
+        if renew and sighting.similarity > _GOOD_SIMILARITY:
             self._recent = self._patch(image, self.pixel)
-        if len(self._features) < _MOST_FEATURES // 2 and sighting.likeness > _LIKENESS_FOR_FEATURES:
+        if len(self._features) < _MAX_FEATURES // 2 and sighting.similarity > _MIN_SIMILARITY_FOR_FEATURES:
             self._features = self._find_features(image)
         self._previous = image
 
     def _flow(self, image: Image, expected_px: Pixel) -> tuple[Pixel | None, NDArray[np.float32], float]:
-        """Carry the features to the new image: the thing's new place, the features that moved with it, its growth."""
+        """Follow the features to the new image; return the target's position, the features, and the change of scale."""
         none = np.empty((0, 2), np.float32)
-        if len(self._features) < _FEWEST_FEATURES:
+        if len(self._features) < _MIN_FEATURES:
             return None, none, 1.0
         reach = np.abs(self._features - np.array(self.pixel)).max(axis=0)
         half = np.ceil(reach).astype(int) + _FLOW_MARGIN_PX
@@ -117,13 +116,13 @@ class Appearance:
         back, returned, _ = cv2.calcOpticalFlowPyrLK(after, before, there, None, **options)
         trip = np.linalg.norm((back - start).reshape(-1, 2), axis=1)
         good = (found.ravel() == 1) & (returned.ravel() == 1) & (trip < _ROUND_TRIP_PX)
-        if int(good.sum()) < _FEWEST_FEATURES:
+        if int(good.sum()) < _MIN_FEATURES:
             return None, none, 1.0
         before_px = self._features[good]
         after_px = there.reshape(-1, 2)[good] + np.array(new, np.float32)
         shift = np.median(after_px - before_px, axis=0)
         agree = np.linalg.norm(after_px - before_px - shift, axis=1) < _OUTLIER_PX
-        if int(agree.sum()) < max(_FEWEST_FEATURES, 0.5 * len(agree)):
+        if int(agree.sum()) < max(_MIN_FEATURES, 0.5 * len(agree)):
             return None, none, 1.0
         before_px, after_px = before_px[agree], after_px[agree]
         step = _scale_step(before_px, after_px)
@@ -131,8 +130,8 @@ class Appearance:
         return (self.pixel[0] + float(offset[0]), self.pixel[1] + float(offset[1])), after_px, step
 
     def _anchor(self, image: Image, expected_px: Pixel, reach: int) -> tuple[Pixel, float]:
-        """Return the place within reach where it looks most like itself, at first or of late, and how much."""
-        best, likeness = expected_px, -1.0
+        """Return the position within reach most similar to the first or recent template, and the similarity."""
+        best, similarity = expected_px, -1.0
         x0 = [round(e) - h - reach for e, h in zip(expected_px, self._half, strict=True)]
         area = cut(image, x0[0], x0[1], *(2 * (h + reach) + 1 for h in self._half)).astype(np.float32)
         for template in (self._recent, self._first):
@@ -141,26 +140,26 @@ class Appearance:
                 resized = _zoomed(template, self.scale)
             surface = cv2.matchTemplate(area, resized, cv2.TM_CCOEFF_NORMED)
             j, i = divmod(int(np.nan_to_num(surface, nan=-1.0).argmax()), surface.shape[1])
-            if float(surface[j, i]) > likeness:
-                likeness = float(surface[j, i])
+            if float(surface[j, i]) > similarity:
+                similarity = float(surface[j, i])
                 di, dj = _peak(surface, i, j)
                 best = (x0[0] + self._half[0] + i + di, x0[1] + self._half[1] + j + dj)
             if template is self._recent and self._recent is self._first:
                 break
-        return best, likeness
+        return best, similarity
 
 
 def _scale_step(before: NDArray[np.float32], after: NDArray[np.float32]) -> float:
-    """Return how much the features spread apart, robustly; 1 where they are too few to tell."""
-    if len(before) < 2 * _FEWEST_FEATURES:
+    """Return the change of the features' spread, robustly; 1 where they are too few to measure it."""
+    if len(before) < 2 * _MIN_FEATURES:
         return 1.0
     old = np.linalg.norm(before - np.median(before, axis=0), axis=1)
     new = np.linalg.norm(after - np.median(after, axis=0), axis=1)
     far = old > 3.0
-    if int(far.sum()) < _FEWEST_FEATURES:
+    if int(far.sum()) < _MIN_FEATURES:
         return 1.0
     ratio = float(np.median(new[far] / old[far]))
-    return min(max(ratio, 1.0 - _LARGEST_SCALE_STEP), 1.0 + _LARGEST_SCALE_STEP)
+    return min(max(ratio, 1.0 - _MAX_SCALE_STEP), 1.0 + _MAX_SCALE_STEP)
 
 
 def _zoomed(template: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
@@ -181,8 +180,3 @@ def _peak(surface: NDArray[np.float32], i: int, j: int) -> tuple[float, float]:
         bend = before - 2 * at + after
         offsets.append(min(max(0.5 * (before - after) / bend, -0.5), 0.5) if bend < -1e-9 else 0.0)
     return offsets[0], offsets[1]
-
-
-def distance(a: Pixel, b: Pixel) -> float:
-    """Return the distance of two pixels."""
-    return math.hypot(a[0] - b[0], a[1] - b[1])

@@ -1,0 +1,37 @@
+"""The followed target as a message."""
+
+import math
+
+from std_msgs.msg import Header
+
+from vergence_common.stamps import to_stamp
+from vergence_metric.disparity.angular_disparity import AngularDisparity
+from vergence_metric.measurement.edge_metric import EdgeMetricResult
+from vergence_metric.tracking.track import Track
+from vergence_msgs.msg import TargetTrack
+
+
+def track_message(
+    track: Track, result: EdgeMetricResult, angular: AngularDisparity | None, header: Header, pair_skew_s: float
+) -> TargetTrack:
+    """Return the track of a pair, in the images before alignment; `angular` is None without camera models."""
+    height, width = result.left_grey.shape
+    right_x_px, right_y_px = result.alignment.unaligned(*track.right_px, width, height)
+    return TargetTrack(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        track_id=track.track_id,
+        lock_stamp=to_stamp(track.lock_stamp_s if math.isfinite(track.lock_stamp_s) else 0.0),
+        left_x_px=track.left_px[0],
+        left_y_px=track.left_px[1],
+        right_x_px=right_x_px,
+        right_y_px=right_y_px,
+        disparity_px=track.disparity_px if angular is None else angular.horizontal_px,
+        disparity_rad=math.nan if angular is None else angular.horizontal_rad,
+        sigma_px=track.sigma_px,
+        extent_width_px=track.extent_px[0],
+        extent_height_px=track.extent_px[1],
+        confidence=track.confidence,
+        status=int(track.status),
+        reason=track.reason,
+    )
