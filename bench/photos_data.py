@@ -20,6 +20,7 @@ Image = npt.NDArray[np.uint8]
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "photographs"
 VIEW_PX = 480, 320
 LIT_DIFFERENTLY = "PianoL"
+MOTORCYCLE = "stereo_motorcycle"
 _ETH3D_FOCAL_PX = 542.0
 
 
@@ -55,7 +56,13 @@ def pair_names() -> list[str]:
 
 
 def targets(name: str, count: int) -> list[Target]:
-    """Return up to `count` targets of a pair, spread over the list of those that were prepared."""
+    """Return up to `count` targets of a pair, spread over the list of those that were prepared.
+
+    "stereo_motorcycle" is scikit-image's pair: its targets are drawn, where there is texture.
+    """
+    if name == MOTORCYCLE:
+        drawn = motorcycle_points(count, seed=22, least_texture=8.0)
+        return [Target(name, PhotoPoint(p.x_px, p.y_px, p.disparity_px)) for p in drawn]
     listed = _described()[name]["targets"]
     assert isinstance(listed, list)
     count = min(count, len(listed))
@@ -66,6 +73,9 @@ def targets(name: str, count: int) -> list[Target]:
 @lru_cache(maxsize=2)
 def pair_of(name: str) -> PhotoPair:
     """Return a pair with the camera that is natural for its source."""
+    if name == MOTORCYCLE:
+        left, right, _ = _motorcycle()
+        return PhotoPair(*(np.ascontiguousarray(image[:, :, ::-1]) for image in (left, right)))
     focal_px = _ETH3D_FOCAL_PX if _described()[name]["source"] == "ETH3D" else 0.0
     return read_pair(DATA / f"{name}_left.jpg", DATA / f"{name}_right.jpg", focal_px)
 
@@ -82,27 +92,28 @@ class KnownPoint:
 
 
 def grey_pair(name: str) -> tuple[Image, Image]:
-    """Return a pair in grey; "stereo_motorcycle" is scikit-image's, with disparity by structured light."""
-    if name == "stereo_motorcycle":
-        left, right, _ = _motorcycle()
-        greys = [cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY) for image in (left, right)]
-    else:
-        pair = pair_of(name)
-        greys = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in (pair.left, pair.right)]
+    """Return a pair in grey."""
+    pair = pair_of(name)
+    greys = [cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in (pair.left, pair.right)]
     return np.asarray(greys[0], np.uint8), np.asarray(greys[1], np.uint8)
 
 
-def motorcycle_points(count: int, seed: int) -> list[KnownPoint]:
-    """Return points drawn evenly from where scikit-image's pair has its disparity and both images show the place."""
+def motorcycle_points(count: int, seed: int, least_texture: float = 0.0) -> list[KnownPoint]:
+    """Return points drawn evenly from where scikit-image's pair has its disparity, and both images show the place.
+
+    The disparity was measured by structured light. `least_texture` is the least standard deviation of grey levels
+    within 10 px.
+    """
     _, _, disparity = _motorcycle()
+    grey = grey_pair(MOTORCYCLE)[0]
     height, width = disparity.shape
     rng = np.random.default_rng(seed)
     points: list[KnownPoint] = []
     while len(points) < count:
         x, y = int(rng.integers(20, width - 20)), int(rng.integers(20, height - 20))
-        value = float(disparity[y, x])
-        if math.isfinite(value) and x - value > 20:
-            points.append(KnownPoint("stereo_motorcycle", x, y, value, exact=True))
+        value, texture = float(disparity[y, x]), float(grey[y - 10 : y + 11, x - 10 : x + 11].std())
+        if math.isfinite(value) and x - value > 20 and texture >= least_texture:
+            points.append(KnownPoint(MOTORCYCLE, x, y, value, exact=True))
     return points
 
 
