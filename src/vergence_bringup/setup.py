@@ -8,14 +8,14 @@ setup(
     packages=find_packages(exclude=["test"]),
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/vergence_bringup"]),
-        ("share/vergence_bringup", ["package.xml"]),
-        # config/ is a link to the repository's own, so that an installed workspace carries the shipped YAML files.
+        ("share/vergence_bringup", ["package.xml", "LICENSE", "CHANGELOG.rst"]),
         ("share/vergence_bringup/config", [path for path in glob("config/*") if not path.endswith("~")]),
         ("share/vergence_bringup/launch", glob("launch/*.launch.py")),
         ("share/vergence_bringup/urdf", glob("urdf/*")),
     ],
     package_data={"vergence_bringup": ["py.typed"]},
     install_requires=["setuptools"],
+    extras_require={"test": ["pytest"]},  # colcon test runs pytest only where this says so
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",

@@ -6,10 +6,11 @@ setup(
     packages=find_packages(exclude=["test"]),
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/vergence_sim"]),
-        ("share/vergence_sim", ["package.xml"]),
+        ("share/vergence_sim", ["package.xml", "LICENSE", "CHANGELOG.rst"]),
     ],
     package_data={"vergence_sim": ["py.typed"]},
     install_requires=["setuptools"],
+    extras_require={"test": ["pytest"]},  # colcon test runs pytest only where this says so
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
