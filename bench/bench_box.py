@@ -1,4 +1,4 @@
-"""Metric II on the simulator against its truth, and the graph's rate with everything running.
+"""Metric II on the simulator against its ground truth, and the rates of the whole graph.
 
 Pairs are 640x480 with the simulator's noise, exposure and mounts, without lens distortion, so that boxes compare.
 """
@@ -28,14 +28,14 @@ WORLDS = range(970_000, 970_006)
 VIEWS = 60
 ALIKE_SEEDS = range(980_000, 980_010)
 ALIKE_VIEWS = 100
-_SURFACE_RAYS = 24  # squared, an eye: with the 6 of the live truth, its own error is 0.2 px
+_SURFACE_RAYS = 24  # per side and eye; with the 6 of the live ground truth its own error would be 0.2 px
 _POINT_95 = 7.815  # of chi squared, three degrees of freedom
 _NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Case:
-    """One pair, the joints, its truth and what metric II gave."""
+    """One pair, the joints, its ground truth and the result of metric II."""
 
     frame: StereoFrame
     left: TrueBox | None
@@ -112,7 +112,7 @@ def _cases(say: Callable[[str], None]) -> Iterator[Case]:
             simulator.set_head(eyes.as_dict())
             frame = simulator.capture()
             left, right = (_cube(simulator.true_boxes(eye)) for eye in ("left", "right"))
-            # Far enough apart in time that each pair stands for itself.
+            # Far enough apart in time for the pairs to be independent.
             result = measurement.measure(frame.left, frame.right, 100.0 * number, eyes, cameras)
             yield Case(frame, left, right, simulator.mean_disparity_px(_SURFACE_RAYS), result)
         simulator.close()
@@ -180,7 +180,7 @@ def _wrong_pairs(say: Callable[[str], None]) -> tuple[int, int]:
                     for box, boxes in zip((pair.left, pair.right), view.boxes_px, strict=True)
                 ]
                 if None in owners:
-                    continue  # a false detection, or one hardly seen: another row's business
+                    continue  # a false detection or a hardly visible cube: measured by other rows
                 pairs, ambiguous = pairs + 1, ambiguous + pair.ambiguous
                 wrong += owners[0] != owners[1] and not pair.ambiguous
         stage.close()

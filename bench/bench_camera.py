@@ -1,7 +1,7 @@
 """Two Motion-JPEG streams through two camera nodes to one subscriber: frames lost, CPU time, delay.
 
-The cameras are recordings that are played at 30 Hz: everything behind the driver's buffer is what a webcam's frames go
-through. The peer is a node that decodes each frame and makes a JPEG of it again (camera_transcoder.py).
+The cameras are recordings played at 30 Hz; from the driver's buffer on, their frames are processed as a webcam's are.
+The peer is a node that decodes each frame and encodes it again as JPEG (camera_transcoder.py).
 """
 
 import contextlib
@@ -43,7 +43,7 @@ _EYES = ("left", "right")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one run of a pair gave: CPU seconds per second and stream, frames lost, the nodes' own delay."""
+    """One run of a pair: CPU seconds per second and stream, frames lost, the nodes' own delay."""
 
     cpu: float
     lost: float
@@ -73,7 +73,7 @@ def run(say: Callable[[str], None]) -> list[Row]:
 
 
 def _in_turn(file: Path, size: tuple[int, int], say: Callable[[str], None]) -> tuple[Outcome, Outcome]:
-    """Measure camera_node and the peer by turns, so that a busy moment of the machine hits neither alone; medians."""
+    """Measure camera_node and the peer alternately, so that other load affects both; return medians."""
     ours, peers = [], []
     for _ in range(_ROUNDS):
         ours.append(measure([_camera_node(eye, file, size) for eye in _EYES], file))
@@ -117,41 +117,41 @@ def record(path: Path, size_px: tuple[int, int], frames: int = 90) -> float:
 
 
 def measure(commands: Sequence[Sequence[str]], file: Path, duration_s: float = _MEASURE_S) -> Outcome:
-    """Run the commands as the two eyes, listen to both, and measure once both have settled.
+    """Run the commands as the two eyes, subscribe to both, and measure once both have settled.
 
-    A frame is lost if its picture of `file` never comes although later ones do; that cannot be told of pictures that
-    were encoded anew (NaN).
+    A frame is lost if its image in `file` never arrives although later ones do; for re-encoded images this is unknown
+    (NaN).
     """
     numbers = {bytes(picture): number for number, picture in enumerate(AviRecording(file).pictures())}
     with own_domain() as domain, contextlib.ExitStack() as stack:
         context = Context()
         rclpy.init(args=[], context=context, domain_id=domain)
         stack.callback(context.try_shutdown)
-        listener = Listener(context, numbers)
+        subscriber = Subscriber(context, numbers)
         executor = SingleThreadedExecutor(context=context)
-        executor.add_node(listener)
+        executor.add_node(subscriber)
         processes = [stack.enter_context(_running(command, domain)) for command in commands]
-        _spin(executor, lambda: all(len(listener.pictures[eye]) > RATE_HZ for eye in _EYES), _START_S)
-        listener.clear()
+        _spin(executor, lambda: all(len(subscriber.pictures[eye]) > RATE_HZ for eye in _EYES), _START_S)
+        subscriber.clear()
         before, began = [_cpu_s(process.pid) for process in processes], time.monotonic()
         _spin(executor, lambda: time.monotonic() - began > duration_s, duration_s + 5.0)
         elapsed = time.monotonic() - began
         cpu = [(_cpu_s(p.pid) - b) / elapsed for p, b in zip(processes, before, strict=True)]
         outcome = Outcome(
             cpu=statistics.mean(cpu),
-            lost=sum(_missing(pictures, len(numbers)) for pictures in listener.pictures.values())
-            if all(-1 not in pictures for pictures in listener.pictures.values())
+            lost=sum(_missing(pictures, len(numbers)) for pictures in subscriber.pictures.values())
+            if all(-1 not in pictures for pictures in subscriber.pictures.values())
             else float("nan"),
-            received=sum(len(pictures) for pictures in listener.pictures.values()),
-            stamp_to_publish_ms=max(listener.publish_ms.values(), default=float("nan")),
-            stamp_to_receive_ms=1e3 * statistics.median(listener.delays_s),
+            received=sum(len(pictures) for pictures in subscriber.pictures.values()),
+            stamp_to_publish_ms=max(subscriber.publish_ms.values(), default=float("nan")),
+            stamp_to_receive_ms=1e3 * statistics.median(subscriber.delays_s),
         )
         executor.shutdown()
-        listener.destroy_node()
+        subscriber.destroy_node()
     return outcome
 
 
-class Listener(Node):
+class Subscriber(Node):
     """The one subscriber of both streams. `numbers` maps the pictures' bytes to their place in the recording."""
 
     def __init__(self, context: Context, numbers: Mapping[bytes, int]) -> None:
@@ -162,23 +162,23 @@ class Listener(Node):
         self.publish_ms: dict[str, float] = {}
         for eye in _EYES:
             self.create_subscription(
-                CompressedImage, f"/{eye}/image_raw/compressed", lambda m, eye=eye: self._take(eye, m), IMAGE_QOS
+                CompressedImage, f"/{eye}/image_raw/compressed", lambda m, eye=eye: self._on_image(eye, m), IMAGE_QOS
             )
-        self.create_subscription(DiagnosticArray, "/diagnostics", self._take_diagnostics, 10)
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
 
     def clear(self) -> None:
-        """Forget what came so far."""
+        """Discard everything received so far."""
         for pictures in self.pictures.values():
             pictures.clear()
         self.delays_s.clear()
         self.publish_ms.clear()
 
-    def _take(self, eye: str, message: CompressedImage) -> None:
+    def _on_image(self, eye: str, message: CompressedImage) -> None:
         stamp_ns = to_nanoseconds(message.header.stamp)
         self.delays_s.append((time.time_ns() - stamp_ns) * 1e-9)
         self.pictures[eye].append(self._numbers.get(bytes(message.data), -1))
 
-    def _take_diagnostics(self, message: DiagnosticArray) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             for entry in status.values:
                 if entry.key == "stamp_to_publish_ms":
@@ -186,7 +186,7 @@ class Listener(Node):
 
 
 def _missing(pictures: Sequence[int], count: int) -> int:
-    """Return how many of a loop of `count` pictures are missing between those that came, by their numbers."""
+    """Return how many images of a loop of `count` are missing between the received ones, by their numbers."""
     return sum((after - before - 1) % count for before, after in itertools.pairwise(pictures))
 
 

@@ -71,7 +71,7 @@ def _result(view: View, found: "object", least_px: float, most_px: float) -> Ima
     ignored = (width < least_px) | (width >= most_px) | (view.visible < HARDLY_VISIBLE)
     boxes, scores = found.xyxy_px, found.scores  # type: ignore[attr-defined]
     if np.isfinite(most_px):
-        # What is far from these sizes is another row's business.
+        # Targets of other sizes belong to other rows.
         own = (boxes[:, 2] - boxes[:, 0] > 0.5 * least_px) & (boxes[:, 2] - boxes[:, 0] < 2.0 * most_px)
         boxes, scores = boxes[own], scores[own]
     return ImageResult(boxes, scores, view.boxes_px, ignored)

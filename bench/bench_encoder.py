@@ -1,4 +1,4 @@
-"""The visual encoder on rendered rooms: how well it reads the eyes' vergence, and what that gains in distance.
+"""The visual encoder on rendered rooms: the accuracy of its vergence, and its effect on the distance.
 
 An SG90 head, whose every servo differs from its data sheet, turns to a target in the lockstep simulator under the gaze
 controller. What its cameras see at rest is rendered with all their imperfections and read by the encoder, to which
@@ -60,19 +60,19 @@ def run(say: Say) -> list[Row]:
 
 
 def _reading_rows(readings: list, errors_rad: np.ndarray) -> list[Row]:
-    believed = [reading.rotation for reading in readings if reading.ok]
-    sigmas = np.array([rotation.sigma_rad for rotation in believed])
+    accepted = [reading.rotation for reading in readings if reading.ok]
+    sigmas = np.array([rotation.sigma_rad for rotation in accepted])
     joints = np.array(
         [r.joint_vergence_rad - r.rotation.vergence_rad for r in readings if r.ok]
-    )  # what the joints are off by, but for the encoder's own error
+    )  # the joints' errors, apart from the encoder's own
     sizes = np.degrees(np.abs(errors_rad))
     return [
-        Row("encoder.believed", len(believed) / max(len(readings), 1), "of the pairs at rest"),
+        Row("encoder.believed", len(accepted) / max(len(readings), 1), "of the pairs at rest"),
         Row("encoder.vergence_error_deg", _median(sizes), "deg", "joint_states", _median(np.degrees(np.abs(joints)))),
         Row("encoder.vergence_error_p95_deg", float(np.quantile(sizes, 0.95)), "deg"),
         Row("encoder.vergence_sigma_deg", _median(np.degrees(sigmas)), "deg"),
         Row("encoder.vergence_interval", float(np.mean(np.abs(errors_rad) < 1.96 * sigmas)), "share inside"),
-        Row("encoder.matches", _median([rotation.matches for rotation in believed]), "a pair"),
+        Row("encoder.matches", _median([rotation.matches for rotation in accepted]), "a pair"),
         Row("encoder.residual_px", _median([reading.residual_px for reading in readings if reading.ok]), "px"),
         Row("encoder.pair_ms", _median([1e3 * reading.took_s for reading in readings]), "ms"),
     ]

@@ -1,6 +1,6 @@
 """The gaze controller on seeded scenarios in the lockstep simulator: every law on every servo at every latency.
 
-Nothing is rendered: what the metric nodes would say is drawn from the simulator's kinematics with noise, latency, skew,
+Nothing is rendered: the metric nodes' outputs are drawn from the simulator's kinematics with noise, latency, skew,
 misses and the mounts' errors; every servo differs from its data sheet by a seeded share. A row without a setting in its
 name is of the law `predictive` on SG90 servos at 60 ms; others carry `.<law>.<servo>.<latency>`.
 """

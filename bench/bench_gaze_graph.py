@@ -1,7 +1,7 @@
-"""The gaze controller through real processes: rendered pictures, both metrics, the action, true joints beside the word.
+"""The gaze controller through real processes: rendered images, both metrics, the action, true joints.
 
 Simulator, nodes and recorder share this machine, so cameras and detector run at the demo's rates. The peer is the
-lockstep bench (`gaze`): the same scenarios, at those rates and the latency that was measured here.
+lockstep bench (`gaze`): the same scenarios, at those rates and the latency measured here.
 """
 
 import dataclasses
@@ -96,13 +96,13 @@ def _lag_ms(trace: Trace) -> float:
 
 
 def ramp(way: float, seed: int) -> Scenario:
-    """Return a target that crosses before the eyes to the left (way 1) or right (-1), straight and at one speed."""
+    """Return a target that crosses the view to the left (way 1) or right (-1), straight and at one speed."""
 
     def target(time_s: float) -> Array:
         gone_s = min(max(time_s - MOVES_FROM_S, 0.0), RAMP_S)
         return np.array([0.8, way * RAMP_M_S * (gone_s - 0.5 * RAMP_S), 0.03])
 
-    # They come to it by a saccade, as eyes do.
+    # A saccade brings the eyes to the target.
     aside = scenarios.fixating(target(0.0) + np.array([0.0, 0.12, 0.1]))
     return Scenario(target, aside, MOVES_FROM_S + RAMP_S, "class", seed=25_000 + seed)
 

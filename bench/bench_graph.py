@@ -36,7 +36,7 @@ DISPARITY_PX = 12
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one run gave: the share of pairs that came back, and each pair's latency [ms]."""
+    """One run: the share of pairs whose metric arrived, and each pair's latency [ms]."""
 
     delivered: float
     latency_ms: "np.ndarray"
@@ -76,16 +76,16 @@ def measure(skew_ns: int, seconds: float, shipped_profile: bool) -> Outcome:
         with ProcessGroup(OUT_DIR / "graph_logs", environment) as nodes:
             nodes.start("edge_metric_node", NodeCommand.of("edge_metric_node"))
             with _receiver(domain) as receiver, _eyes(os.environ | environment) as eyes:
-                patience_s = time.monotonic() + 60.0
+                deadline_s = time.monotonic() + 60.0
                 while not (receiver.is_matched() and all(eye.is_ready() for eye in eyes)):
                     nodes.check()
-                    if time.monotonic() > patience_s:
-                        raise RuntimeError("the processes did not find one another within 60 s")
+                    if time.monotonic() > deadline_s:
+                        raise RuntimeError("the processes did not discover one another within 60 s")
                 return _timed_run(eyes, receiver, skew_ns, seconds)
 
 
 def _empty_profile() -> Path:
-    """Return a profile that changes nothing: where none is set, ProcessGroup would set ours."""
+    """Return the path of an empty profile: where none is set, ProcessGroup sets the shipped one."""
     path = OUT_DIR / "default_transport.xml"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text('<profiles>\n  <participant profile_name="as_built"/>\n</profiles>\n')
@@ -93,7 +93,7 @@ def _empty_profile() -> Path:
 
 
 class Eye:
-    """One `bench.graph_eye_publisher` and the lines that go to and fro."""
+    """A `bench.graph_eye_publisher` process and its pipes."""
 
     def __init__(self, topic: str, shift_px: int, environment: dict[str, str]) -> None:
         self._process = subprocess.Popen(
@@ -109,26 +109,26 @@ class Eye:
         self._ready = False
 
     def is_ready(self) -> bool:
-        """Tell whether the eye has said that the node takes its images; waits a little for it."""
+        """Return whether the eye has been matched with the node; waits up to 0.1 s."""
         if not self._ready and select.select([self._from], [], [], 0.1)[0]:
             line = self._from.readline()
             if not line:
-                raise RuntimeError(f"an eye ended with status {self._process.wait()}")
+                raise RuntimeError(f"graph_eye_publisher ended with status {self._process.wait()}")
             self._ready = line.strip() == "ready"
         return self._ready
 
     def start(self, **timetable: int) -> None:
-        """Let it publish; see `bench.graph_eye_publisher`."""
+        """Start publishing; see `bench.graph_eye_publisher`."""
         print(json.dumps(timetable), file=self._to, flush=True)
 
     def published_ns(self) -> dict[int, int]:
-        """Return when each stamp was published, once all are, and let the eye end."""
+        """Wait for the last image, return each stamp's time of publication [ns], and let the eye exit."""
         sent = dict(json.loads(self._from.readline()))
         print(file=self._to, flush=True)
         return sent
 
     def end(self) -> None:
-        """Let it end by itself, as it does once its input ends; one killed may crash who shares memory with it."""
+        """Close its input, so that it exits; a killed process may crash those that share memory with it."""
         self._to.close()
         try:
             self._process.wait(timeout=5.0)
@@ -159,7 +159,7 @@ def _timed_run(eyes: list[Eye], receiver: "Receiver", skew_ns: int, seconds: flo
 
 
 class Receiver:
-    """Takes down when each pair's `vergence/edge` arrives, and the node's own timings."""
+    """Records the arrival of each pair's `vergence/edge`, and the node's own timings."""
 
     def __init__(self, context: Context) -> None:
         self.arrived_ns: dict[int, int] = {}
@@ -179,7 +179,7 @@ class Receiver:
                 self.stages.update((pair.key, pair.value) for pair in status.values)
 
     def is_matched(self) -> bool:
-        """Receive for a little; True once the node is heard, so that it has found this receiver too."""
+        """Receive for 0.2 s; True once diagnostics of the node arrive: discovery is complete."""
         self.executor.spin_once(timeout_sec=0.2)
         return bool(self.stages)
 

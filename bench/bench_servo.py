@@ -1,7 +1,7 @@
 """Servos: from a command on a topic to a pulse written, hostile commands, and what each backend's steps cost.
 
 Latency: servo_node is a process of its own and drives the kernel PWM backend; the channel's duty_cycle is a pipe, so
-that this process hears of the pulse when the node writes it. Measured from before publish() to after the read.
+that this process reads the pulse when the node writes it. Measured from before publish() to after the read.
 """
 
 import math
@@ -142,7 +142,7 @@ def _piped_node(root: Path, domain: int) -> Iterator[int]:
 
 
 class _Watched(FakeDriver):
-    """The shipped fake, which judges every pulse by the limits: any grid, failing now and then."""
+    """The shipped fake driver; checks every pulse against the limits, on any grid, with occasional failures."""
 
     def __init__(self, limits: dict[int, ServoLimits], resolution_us: float, random: np.random.Generator) -> None:
         self.now_s = 1000.0
@@ -167,7 +167,7 @@ class _Watched(FakeDriver):
 
 
 def hostile_violations(count: int) -> tuple[int, int, int]:
-    """Send `count` commands made to do harm; return (unsafe pulses, commands taken, pulses written)."""
+    """Send `count` hostile commands; return (unsafe pulses, commands taken, pulses written)."""
     random = np.random.default_rng(7)
     rig = default_rig()
     limits = {name: servo_limits(name, servo, rig.joints[name]) for name, servo in default_servos().items()}
@@ -210,7 +210,7 @@ def _attempt(head: ServoHead, stamps: StampGuard, now_s: float, random: np.rando
         elif act < 30:
             stamps.check(int((now_s + random.choice([0, 0, 0, -1e-4, -2, 5, -900])) * 1e9), int(now_s * 1e9))
             head.command(named_positions(names, positions, tuple(head.channels)), now_s)
-        else:  # what if the guard had a hole
+        else:  # bypasses the command guard
             head.command(dict(zip(names, positions, strict=False)), now_s)
     except CommandRefusedError:
         if act == 0:

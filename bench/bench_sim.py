@@ -1,4 +1,4 @@
-"""What a simulated pair costs, and how much faster than real time the lockstep simulator runs."""
+"""Cost of a simulated pair, and speed of the lockstep simulator relative to real time."""
 
 import time
 from collections.abc import Callable

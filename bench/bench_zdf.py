@@ -1,4 +1,4 @@
-"""The zero-disparity filter: how near its region's centroid comes to the true target, and what it costs."""
+"""The zero-disparity filter: distance of its region's centroid from the true target, and its cost."""
 
 import time
 from collections.abc import Callable

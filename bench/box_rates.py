@@ -1,4 +1,4 @@
-"""The whole graph on one machine: simulator, both metrics and controller as processes, their rates counted here."""
+"""Rates of both metrics in the whole graph of the simulated head, every node as a process on this machine."""
 
 import time
 from collections.abc import Callable
@@ -20,7 +20,7 @@ COUNTED_S = 25.0
 
 
 def measure_rates(say: Callable[[str], None]) -> tuple[float, float]:
-    """Return how many pairs a second box_metric_node and edge_metric_node measure, each with its shipped YAML [Hz]."""
+    """Return the rates [Hz] of box_metric_node and edge_metric_node, with the shipped YAML."""
     with own_domain() as domain, ProcessGroup(extra_environment={"ROS_DOMAIN_ID": str(domain)}) as nodes:
         for executable in graph(SIMULATED):
             nodes.start(executable, NodeCommand.of(executable))

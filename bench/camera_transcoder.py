@@ -1,7 +1,7 @@
-"""The camera driver that a user would write today: OpenCV decodes every frame, and JPEG is made of it again.
+"""The peer of camera_node: OpenCV decodes every frame and encodes it again as JPEG.
 
-`python -m bench.camera_transcoder FILE RATE_HZ --ros-args -r __ns:=/left`: same topic, same pictures, same rate as
-camera_node, so that the two differ in nothing but the decoding and encoding.
+`python -m bench.camera_transcoder FILE RATE_HZ --ros-args -r __ns:=/left`: same topic, images and rate as
+camera_node, so that the two differ in decoding and encoding only.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Stereo pairs with a known disparity at the image centre, for the benchmarks of edges, contrast and alignment.
+"""Stereo pairs with a known disparity at the image centre, for the contrast benchmark.
 
 Every shift is real: both views are cut out of a picture that goes on beyond them, sub-pixel shifts by bicubic
 interpolation, and nothing wraps around. Pictures are drawn (four kinds of texture) or photographs that scikit-image
@@ -29,7 +29,7 @@ MINIMUM_GRADIENT = 6.0
 
 @dataclass(frozen=True)
 class Degradation:
-    """What separates two real cameras: noise in both views; gain, roll and vertical offset of the right one."""
+    """Differences of two real cameras: noise in both views; gain, roll and vertical offset of the right one."""
 
     noise_sigma: float = 0.0
     gain: float = 1.0
@@ -41,7 +41,7 @@ HARD = Degradation(noise_sigma=8.0, gain=1.3, roll_rad=float(np.deg2rad(1.0)))
 
 
 @dataclass(frozen=True)
-class JudgedPair:
+class LabelledPair:
     """Two views, the disparity x_left - x_right of what lies at their centre [px], and where they come from."""
 
     left: Grey
@@ -126,24 +126,24 @@ def cut(picture: Picture, centre_x: float, centre_y: float, height: int, width: 
 
 
 def exposed(view: Picture, rng: np.random.Generator, noise_sigma: float, gain: float = 1.0) -> Grey:
-    """Return what a camera makes of `view`: gain, noise, saturation, 8 bits."""
+    """Return the camera image of `view`: gain, noise, saturation, 8 bits."""
     return np.clip(np.rint(gain * view + rng.normal(0.0, noise_sigma, view.shape)), 0, 255).astype(np.uint8)
 
 
 def textured(view: Picture) -> bool:
-    """Tell whether the central 50 px of a view have the stated minimum gradient."""
+    """Return whether the central 50 px of a view have the stated minimum gradient."""
     y, x = view.shape[0] // 2 - 25, view.shape[1] // 2 - 25
     return float(np.sqrt(np.mean(np.diff(view[y : y + 50, x : x + 51], axis=1) ** 2))) >= MINIMUM_GRADIENT
 
 
-def judged_pairs(
+def labelled_pairs(
     rng: np.random.Generator,
     drawings: tuple[str, ...],
     photographs: tuple[str, ...],
     count: int,
     degradation: Degradation,
     disparity_px: Callable[[np.random.Generator], float],
-) -> Iterator[JudgedPair]:
+) -> Iterator[LabelledPair]:
     """Yield `count` pairs whose fovea has a disparity drawn by `disparity_px`, half of them drawn, half photographed.
 
     Half of the drawn ones are a disc of 30 to 70 px radius before a background at another depth.
@@ -161,7 +161,7 @@ def judged_pairs(
         pair = _views(rng, picture, behind, disparity, degradation)
         if pair is not None:
             made += 1
-            yield JudgedPair(pair[0], pair[1], disparity, name)
+            yield LabelledPair(pair[0], pair[1], disparity, name)
 
 
 def _views(

@@ -1,4 +1,4 @@
-"""Scenes from the simulator for the fovea's benchmarks: the cube in the furnished room, nearly fixated."""
+"""Rendered scenes for the benchmarks of disparity at the fovea: the cube in the furnished room, nearly fixated."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Scene:
-    """A grey pair that needs no alignment, with the truth of the simulator. `distance_m` is to the target."""
+    """A grey pair that needs no alignment, with the simulator's ground truth. `distance_m` is to the target."""
 
     left: Image
     right: Image

@@ -1,4 +1,4 @@
-"""What the gaze controller's runs say, scenario by scenario, for any law, servo and latency."""
+"""Figures of the gaze controller's runs, scenario by scenario, for any law, servo and latency."""
 
 import math
 from collections.abc import Iterable
@@ -58,7 +58,7 @@ def quantile(values: list[float], share: float) -> float:
 
 
 class StaticFigures:
-    """What the trials with targets at rest say."""
+    """Figures of the trials with static targets."""
 
     def __init__(self, traces: list[Trace], setting: Setting) -> None:
         tolerance = tolerance_deg(setting.servo)
@@ -211,14 +211,14 @@ def occlusion_rows(setting: Setting, given: str = "boxes") -> list[Row]:
 
 
 def occlusion_by_track_rows(setting: Setting) -> list[Row]:
-    """The same for a target that no detector knows."""
+    """The same for a target without a detector class."""
     return occlusion_rows(setting, "click")
 
 
 def crossing_rows(setting: Setting, given: str = "boxes") -> list[Row]:
-    """A target that passes before another at a different depth: whose are the eyes afterwards?
+    """A target that passes before another at a different depth: which target the eyes fixate afterwards.
 
-    The median of the second after it has stopped tells: a law that overshoots there has still kept its target.
+    Judged by the median of the second after it has stopped: overshoot there does not count as loss.
     """
     traces = run_all(scenarios.crossings(counts(setting).crossings, given), setting)
     after = [trace.error_deg[trace.time_s > scenarios.CROSSED_S + 2.0] for trace in traces]
@@ -232,7 +232,7 @@ def crossing_rows(setting: Setting, given: str = "boxes") -> list[Row]:
 
 
 def crossing_by_track_rows(setting: Setting) -> list[Row]:
-    """The same for a target that no detector knows."""
+    """The same for a target without a detector class."""
     return crossing_rows(setting, "click")
 
 

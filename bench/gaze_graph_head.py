@@ -1,4 +1,4 @@
-"""The simulated head as processes: every node with its shipped YAML; scenarios run on it and leave their traces."""
+"""Runs scenarios on a simulated head of processes, every node with its shipped YAML, and returns their traces."""
 
 import contextlib
 import math
@@ -40,7 +40,7 @@ class ProcessHead:
         recorder.wait_for("ground_truth/joint_states", lambda: self._joints, 40.0, nodes.check)
 
     def at_rest(self, scenario: Scenario) -> Trace:
-        """Run a scenario whose target rests, from its start pose; it is given as the scenario says."""
+        """Run a scenario with a static target, given as the scenario says, from its start pose."""
         self._prepare(scenario)
         goal = class_goal(TARGET, _LIMIT_S) if scenario.given == "class" else self._two_clicks()
         began_s, mark = self._recorder.now_s(), len(self._recorder.boxes)
@@ -87,7 +87,7 @@ class ProcessHead:
         return float(np.median(ages))
 
     def _prepare(self, scenario: Scenario) -> None:
-        """Send the eyes to the start with nothing to see there, then show the target and wait for it."""
+        """Move the eyes to the start without a target, then place the target and wait for the ground truth."""
         recorder, pose = self._recorder, scenario.start_rad
         self._stage.clear()
         left, right = pose["pan_left"], pose["pan_right"]
@@ -102,7 +102,7 @@ class ProcessHead:
         )
 
     def _two_clicks(self) -> LookAt.Goal:
-        """Return the goal of a person who clicks on the target in both images."""
+        """Return the goal of clicks on the target in both images."""
         truth = self._recorder.truths[-1].message
         goal = LookAt.Goal(kind=LookAt.Goal.STEREO_PIXEL, time_limit_s=_LIMIT_S)
         goal.header.stamp = truth.header.stamp
@@ -114,7 +114,7 @@ class ProcessHead:
         self._recorder.settle(time_s - self._recorder.now_s(), self._check_alive)
 
     def _trace(self, began_s: float, duration_s: float, first_result_s: float) -> Trace:
-        """Return what happened, sampled where the controller spoke."""
+        """Return what happened, sampled at the controller's messages."""
         recorder = self._recorder
         states = [e for e in recorder.states if 0.0 <= e.arrival_s - began_s <= duration_s]
         time_s = np.array([entry.arrival_s - began_s for entry in states])

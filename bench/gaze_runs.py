@@ -1,4 +1,4 @@
-"""One controller on one head in lockstep, and what came of it as arrays."""
+"""Runs one controller on one head in lockstep and returns its trace as arrays."""
 
 import math
 import time
@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_gaze.control.controller import GazeController
-from vergence_gaze.estimation.observations import BoxSighting, EyeRotationReading, Observation
+from vergence_gaze.estimation.observations import BoxSighting, EyeRotationObservation, Observation
 from vergence_gaze.goals.goal import Goal, GoalKind
-from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.phases import Phase
-from vergence_gaze.testing.fake_head import TICK_S, FakeHead, Seeing
+from vergence_gaze.testing.fake_head import TICK_S, FakeHead, VisionModel
 from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 from vergence_sim.parameters import SimParameters
@@ -28,7 +28,7 @@ CONTROL_TICKS = 6
 ENCODER_TICKS = 60
 ENCODER_LATENCY_TICKS = 30
 
-Encoder: TypeAlias = Callable[[FakeHead], EyeRotationReading | None]
+Encoder: TypeAlias = Callable[[FakeHead], EyeRotationObservation | None]
 """What the visual encoder says of a head as it stands now, if anything."""
 
 
@@ -129,12 +129,12 @@ def real_servo(spec: ServoSpec, spread: float, random: np.random.Generator) -> S
     )
 
 
-def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np.random.Generator) -> Seeing:
+def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np.random.Generator) -> VisionModel:
     """Return how the head sees in this run."""
     boxes = scenario.given in ("boxes", "pairs", "class")
     frame_rate = scenario.given == "pairs"
     frame_ticks = round(1.0 / (TICK_S * realism.frame_rate_hz))
-    return Seeing(
+    return VisionModel(
         latency_s=setting.latency_ms * 1e-3,
         frame_ticks=frame_ticks,
         skew_ticks=int(random.integers(0, 6)),
@@ -207,7 +207,8 @@ def run(
         # The target appears at 0; the head has been awake for a while by then, at any phase of its frames.
         begin_s=-TICK_S * int(random.integers(90, 120)),
     )
-    controller = GazeController(rig, GazeParameters(law=setting.law, **dict(parameters or {})), CONTROL_TICKS * TICK_S)
+    values = {"law": setting.law, **dict(parameters or {})}
+    controller = GazeController(rig, gaze_parameters(values), CONTROL_TICKS * TICK_S)
     return _loop(head, controller, scenario)
 
 
@@ -215,7 +216,7 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
     arrived: list[Observation] = []
     samples: list[tuple[float, Array, Array, Array, bool, int, tuple[float, float, float], float]] = []
     first_result_s, way_s, ticks, begun = math.inf, 0.0, 0, False
-    reading: EyeRotationReading | None = None
+    reading: EyeRotationObservation | None = None
     while head.time_s < scenario.duration_s:
         arrived += head.advance()
         ticks += 1

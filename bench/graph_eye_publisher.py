@@ -1,4 +1,4 @@
-"""One eye as a process of its own: publishes image_raw on a timetable and writes down when.
+"""One eye as a process: publishes image_raw on a timetable and prints the times of publication.
 
     python -m bench.graph_eye_publisher TOPIC SHIFT_PX
 
