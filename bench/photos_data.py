@@ -75,7 +75,7 @@ def pair_of(name: str) -> PhotoPair:
     """Return a pair with the camera that is natural for its source."""
     if name == MOTORCYCLE:
         left, right, _ = _motorcycle()
-        return PhotoPair(*(np.ascontiguousarray(image[:, :, ::-1]) for image in (left, right)))
+        return PhotoPair(np.ascontiguousarray(left[:, :, ::-1]), np.ascontiguousarray(right[:, :, ::-1]))
     focal_px = _ETH3D_FOCAL_PX if _described()[name]["source"] == "ETH3D" else 0.0
     return read_pair(DATA / f"{name}_left.jpg", DATA / f"{name}_right.jpg", focal_px)
 

@@ -23,10 +23,11 @@ from vergence_gaze.goals.goal import Goal, GoalKind
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.ros import gaze_messages
+from vergence_metric.disparity.angular_disparity import angular_disparity
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import PairMeasurementParameters
-from vergence_metric.pairs.viewing_angles import angular_disparity
-from vergence_metric.ros import metric_messages
+from vergence_metric.ros.edge_messages import edge_message, error_message
+from vergence_metric.ros.track_messages import track_message
 from vergence_rig.camera import CameraModel
 from vergence_rig.joint_history import JointHistory
 from vergence_rig.rig import JOINT_NAMES, Rig
@@ -92,15 +93,15 @@ class MetricOfPairs:
         edge = measurement.edge(left, right)
         disparity = measurement.disparity(edge)
         angular = angular_disparity(*models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px)
-        error = metric_messages.error_message(disparity, angular, header, skew_s)
+        error = error_message(disparity, angular, header, skew_s)
         verged = measurement.verged(edge, error.horizontal_px, error.confidence)
-        edges = metric_messages.edge_message(edge, verged, header, skew_s)
+        edges = edge_message(edge, verged, header, skew_s)
         now_ns = _ns(left_stamp_s)
         eyes = self._joints.at(now_ns, _ns(right_stamp_s))
         passed = self._joints.samples_between(now_ns - _LOOK_BACK_NS, now_ns)
         track = measurement.track(edge, left_stamp_s, eyes, models, [(ns * 1e-9, angles) for ns, angles in passed])
         angular = angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
-        tracked = metric_messages.track_message(track, edge, angular, header, skew_s)
+        tracked = track_message(track, edge, angular, header, skew_s)
         measurement.update_alignment()
         return [
             gaze_messages.edge_judgement(edges),

@@ -34,8 +34,11 @@ class World(Protocol):
     """A head and what it sees, in lockstep."""
 
     parameters: SimParameters
-    lenses: Mapping[str, Lens]
     time_s: float
+
+    @property
+    def lenses(self) -> Mapping[str, Lens]:
+        """The lenses of both eyes."""
 
     def set_parameters(self, parameters: SimParameters) -> None:
         """Change the parameters that are not fixed at the start."""
