@@ -46,15 +46,15 @@ class RestCounter:
     """Counts how often in succession a head's joints have reported the same angles."""
 
     def __init__(self) -> None:
-        self._said: Array | None = None
+        self._angles: Array | None = None
         self.times = 0
 
     def update(self, head: FakeHead) -> bool:
         """Update with the joints' angles reported now."""
-        said = np.array([head.reported_rad[name] for name in JOINT_NAMES])
-        same = self._said is not None and bool(np.abs(said - self._said).max() <= REST_RAD)
+        angles = np.array([head.reported_rad[name] for name in JOINT_NAMES])
+        same = self._angles is not None and bool(np.abs(angles - self._angles).max() <= REST_RAD)
         self.times = self.times + 1 if same else 0
-        self._said = said
+        self._angles = angles
         return same
 
 
@@ -73,7 +73,7 @@ class DrawnFeatures:
         if not self._rest.update(head) or self._rest.times > READINGS_PER_REST:
             return None
         focal_px = head.rig.left_camera.fx_px
-        said = np.array([head.reported_rad[name] for name in JOINT_NAMES])
+        angles = np.array([head.reported_rad[name] for name in JOINT_NAMES])
         # One pose has one set of features, whose errors last; a frame adds little of its own.
         lasting = np.random.default_rng([self._seed, *(np.abs(said) * 1e6).astype(int).tolist()])
         passing = np.random.default_rng([self._seed, round(head.time_s * 1e4) + 10**6])

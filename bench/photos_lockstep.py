@@ -104,7 +104,7 @@ class MetricOfPairs:
         tracked = track_message(track, edge, angular, header, skew_s)
         measurement.update_alignment()
         return [
-            gaze_messages.edge_judgement(edges),
+            gaze_messages.edge_contrast(edges),
             gaze_messages.fovea_disparity(error, models[0].fx_px),
             gaze_messages.track_sighting(tracked, models[0]),
         ]

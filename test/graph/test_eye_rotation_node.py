@@ -62,7 +62,7 @@ class Head:
         k = [camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0]
         for publisher in self.infos:
             publisher.publish(
-                CameraInfo(width=640, height=480, k=k, d=list(SIMULATED.distortion), distortion_model="plumb_bob")
+                CameraInfo(width=640, height=480, k=k, d=list(SIMULATED.camera.distortion), distortion_model="plumb_bob")
             )
 
     def show(self, left: npt.NDArray[np.uint8], right: npt.NDArray[np.uint8], turn_rad: float = 0.0) -> None:
@@ -83,8 +83,8 @@ class Head:
 
     def _all_arrived(self) -> bool:
         received = self.node._stereo._pairer.statistics.received
-        samples = self.node._joints._samples
-        return min(received) >= self._shown and bool(samples) and samples[-1].stamp_ns >= self._joints_ns
+        joints = self.node._joints
+        return min(received) >= self._shown and joints.known and joints.newest.stamp >= self._joints_ns
 
     def turned(self, turn_rad: float) -> float:
         return turn_rad * ((self.stamp_ns // PERIOD_NS) % 2)

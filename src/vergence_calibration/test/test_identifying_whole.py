@@ -27,7 +27,7 @@ from vergence_calibration.identification.seen_motion import shrunk, shrunk_camer
 from vergence_calibration.kept_file import replace as replace_file
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.goals.goal import Goal, GoalKind
-from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_rig.camera import CameraModel
 from vergence_rig.rig import JOINT_NAMES, CameraSpec, Rig, default_rig, load_rig
@@ -244,7 +244,7 @@ def pursuit_error_deg(believed: Rig, true_latency_s: float) -> float:
     """Return how far the eyes are behind a target at 20 degrees/s, with a controller that believes this rig."""
     slow = replace(SG90, command_latency_s=true_latency_s, dead_band_rad=0.0, backlash_rad=0.0, pulse_step_rad=0.0)
     head = FakeHead(default_rig().with_servos(slow), ramp)
-    controller = GazeController(believed, GazeParameters())
+    controller = GazeController(believed, gaze_parameters())
     arrived, errors, ticks = [], [], 0
     while head.time_s < 2.4:
         arrived += head.advance()

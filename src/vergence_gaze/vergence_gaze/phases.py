@@ -1,4 +1,4 @@
-"""The phases of gaze, and when one gives way to another."""
+"""The phases of gaze, and the transitions between them."""
 
 import enum
 import math
@@ -23,7 +23,7 @@ class Phase(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Situation:
-    """What the phases depend on, at one cycle."""
+    """The state that the transitions depend on, in one cycle."""
 
     now_s: float
     active: bool
@@ -37,61 +37,61 @@ class Situation:
 
 
 class PhaseMachine:
-    """Holds the phase, since when, and why."""
+    """The present phase, since when, and why."""
 
     def __init__(self, parameters: GazeParameters) -> None:
         self._p = parameters
         self.phase = Phase.IDLE
-        self.reason = "no goal yet"
+        self.reason = "idle: no goal yet"
         self.since_s = -math.inf
         self._land_by_s = -math.inf
         self._landed_s = -math.inf
 
     def enter(self, phase: Phase, reason: str, now_s: float) -> None:
-        """Go to a phase for a reason of the caller's; the same phase only takes the reason."""
+        """Enter a phase for a reason of the caller's; for the present phase only the reason changes."""
         if phase is not self.phase:
             self.phase, self.since_s = phase, now_s
         self.reason = reason
 
-    def advance(self, s: Situation) -> Phase:
+    def update(self, s: Situation) -> Phase:
         """Return the phase for this situation."""
         if not s.active:
             if self.phase is not Phase.IDLE:
-                self.enter(Phase.IDLE, "told to hold", s.now_s)
+                self.enter(Phase.IDLE, "idle: holding still", s.now_s)
             return self.phase
         if not s.has_target:
             self._without_target(s)
         elif self.phase is Phase.SACCADE:
             self._in_saccade(s)
-        elif s.unseen_s > self._p.lost_after_s:
+        elif s.unseen_s > self._p.target.lost_after_s:
             self._unseen(s)
-        elif s.residual_rad > self._p.saccade_threshold_rad and s.now_s - self._landed_s > _SACCADE_AGAIN_S:
+        elif s.residual_rad > self._p.saccade.threshold_rad and s.now_s - self._landed_s > _SACCADE_AGAIN_S:
             self._land_by_s = s.now_s + s.travel_s + _LANDING_TIMEOUT_S
-            self.enter(Phase.SACCADE, f"error {math.degrees(s.residual_rad):.1f} deg", s.now_s)
+            self.enter(Phase.SACCADE, f"gaze error {math.degrees(s.residual_rad):.1f} deg", s.now_s)
         elif s.verged:
-            self.enter(Phase.FIXATE, "verged", s.now_s)
+            self.enter(Phase.FIXATE, "the eyes are verged on the target", s.now_s)
         else:
-            self.enter(Phase.VERGE, f"error {math.degrees(s.residual_rad):.2f} deg", s.now_s)
+            self.enter(Phase.VERGE, f"gaze error {math.degrees(s.residual_rad):.2f} deg", s.now_s)
         return self.phase
 
     def _in_saccade(self, s: Situation) -> None:
         if s.eyes_still and s.now_s - self.since_s > 0.01:
             self._landed_s = s.now_s
-            self.enter(Phase.VERGE, "the eyes are still", s.now_s)
+            self.enter(Phase.VERGE, "the saccade has ended: the eyes are still", s.now_s)
         elif s.now_s > self._land_by_s:
             self._landed_s = s.now_s
-            self.enter(Phase.VERGE, "the eyes did not arrive in time", s.now_s)
+            self.enter(Phase.VERGE, "the saccade did not end in time", s.now_s)
 
     def _without_target(self, s: Situation) -> None:
         if self.phase not in (Phase.LOST, Phase.SEARCH):
-            self.enter(Phase.LOST, "no target yet", s.now_s)
-        elif self.phase is Phase.LOST and s.may_search and s.now_s - self.since_s > self._p.search_dwell_s:
-            self.enter(Phase.SEARCH, "no target in view", s.now_s)
+            self.enter(Phase.LOST, "no target seen yet", s.now_s)
+        elif self.phase is Phase.LOST and s.may_search and s.now_s - self.since_s > self._p.search.dwell_s:
+            self.enter(Phase.SEARCH, "no target in view: searching", s.now_s)
 
     def _unseen(self, s: Situation) -> None:
         if self.phase is Phase.SEARCH:
             return
         if self.phase is not Phase.LOST:
-            self.enter(Phase.LOST, f"not seen for {s.unseen_s:.1f} s", s.now_s)
-        elif s.may_search and s.now_s - self.since_s > self._p.search_after_s:
-            self.enter(Phase.SEARCH, "not seen again where it was lost", s.now_s)
+            self.enter(Phase.LOST, f"target not seen for {s.unseen_s:.1f} s", s.now_s)
+        elif s.may_search and s.now_s - self.since_s > self._p.search.after_s:
+            self.enter(Phase.SEARCH, "target not seen again where it was lost: searching", s.now_s)

@@ -1,1 +1,1 @@
-"""The control loop: perception, phases and law in one step, and its report."""
+"""The control loop: state estimate, phases and law in one step, and its report."""

@@ -1,4 +1,4 @@
-"""What the controller says of itself every cycle, as GazeState carries it."""
+"""The controller's report of every cycle, as GazeState carries it."""
 
 import math
 from dataclasses import dataclass
@@ -44,38 +44,40 @@ class GazeReport:
 
 @dataclass(frozen=True)
 class Command:
-    """One cycle's result: joint angles (3,) that were sent, None before the joints are known; and goals that ended."""
+    """One cycle's result: joint angles (3,) to send, or None; the report; and the goals that ended."""
 
     joints_rad: Array | None
     report: GazeReport
     outcomes: tuple[Outcome, ...]
 
 
-def report_of(now_s: float, seen: Perception, phases: PhaseMachine, law: str, mode: str, rig: Rig) -> GazeReport:
-    """Return what is known at `now_s`, and what is done about it by which law and mode."""
-    known = seen.history.known and math.isfinite(now_s)
-    joints = seen.history.shaft_rad if known else np.full(3, math.nan)
-    estimate = seen.tracking.estimate(now_s) if known else None
+def make_report(
+    now_s: float, perception: Perception, phases: PhaseMachine, law: str, mode: str, rig: Rig
+) -> GazeReport:
+    """Return the state at `now_s` under this law and mode."""
+    known = perception.history.known and math.isfinite(now_s)
+    joints = perception.history.shaft_rad if known else np.full(3, math.nan)
+    estimate = perception.tracking.estimate(now_s) if known else None
     residual = residual_of(estimate, joints)
     fixation, miss = fixation_of_joints(joints, rig.baseline_m)
-    reason = phases.reason if known else "no joint_states have arrived"
-    if phases.phase is Phase.VERGE and not seen.judge.verged:
-        reason = f"{reason}; {seen.tracking.note or seen.judge.reason}"
+    reason = phases.reason if known else "waiting for joint_states: none have arrived"
+    if phases.phase is Phase.VERGE and not perception.judge.verged:
+        reason = f"{reason}; {perception.tracking.note or perception.judge.reason}"
     return GazeReport(
-        stamp_s=seen.pair_s if math.isfinite(seen.pair_s) else now_s,
+        stamp_s=perception.pair_s if math.isfinite(perception.pair_s) else now_s,
         phase=phases.phase,
         reason=reason,
         law=law,
         mode=mode,
-        verged=seen.judge.verged,
-        target_moving=seen.tracking.filter.moving,
+        verged=perception.judge.verged,
+        target_moving=perception.tracking.filter.moving,
         version_rad=0.5 * float(joints[0] + joints[1]),
         vergence_rad=float(joints[1] - joints[0]),
         tilt_rad=float(joints[2]),
         residual_rad=residual,
         residual_px=disparity_px(residual[1], rig.left_camera.fx_px),
-        contrast=seen.judge.contrast,
-        target=seen.position(estimate),
+        contrast=perception.judge.contrast,
+        target=perception.position(estimate),
         fixation_m=fixation,
         miss_distance_m=miss,
     )

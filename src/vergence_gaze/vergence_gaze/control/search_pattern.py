@@ -1,4 +1,4 @@
-"""Where to look for a target that is out of view: overlapping fields of view over all that the eyes can reach."""
+"""Where to look for a target out of view: overlapping fields of view over all that the eyes can reach."""
 
 import math
 
@@ -27,7 +27,7 @@ class SearchPattern:
         self._places = [(version, tilt_rad) for tilt_rad in tilts for version in versions]
         self._unvisited = list(self._places)
 
-    def next(self, version_rad: float, tilt_rad: float) -> tuple[float, float]:
+    def next_place(self, version_rad: float, tilt_rad: float) -> tuple[float, float]:
         """Return the nearest place (version, tilt) [rad] not yet visited; tilt is NaN where it is not to move."""
         if not self._unvisited:
             self._unvisited = list(self._places)
@@ -42,7 +42,7 @@ class SearchPattern:
 
 
 class Searcher:
-    """Goes through the pattern: travels to a place, rests there for a look, goes on."""
+    """Goes through the pattern: travels to a place, rests there for an image, goes on."""
 
     def __init__(self, rig: Rig, tilt_enabled: bool, vergence_rad: float, dwell_s: float) -> None:
         self._make = lambda: SearchPattern(rig, tilt_enabled, vergence_rad)
@@ -51,18 +51,18 @@ class Searcher:
         self.stop()
 
     def stop(self) -> None:
-        """The search is over; the next begins with all places unvisited."""
+        """End the search; the next starts with all places unvisited."""
         self._pattern: SearchPattern | None = None
         self._until_s = -math.inf
         self._place = (math.nan, math.nan)
 
-    def wanted(self, now_s: float, shaft_rad: Array, speed_rad_s: Array) -> Array:
+    def next_pose(self, now_s: float, shaft_rad: Array, speed_rad_s: Array) -> Array:
         """Return the joint angles (3,) to look at next, given the present ones (3,) and the joints' speeds (3,)."""
         if self._pattern is None:
             self._pattern = self._make()
         if now_s > self._until_s:
             version, tilt = 0.5 * float(shaft_rad[0] + shaft_rad[1]), float(shaft_rad[2])
-            self._place = self._pattern.next(version, tilt)
+            self._place = self._pattern.next_place(version, tilt)
             away = (abs(self._place[0] - version), abs(np.nan_to_num(self._place[1] - tilt)))
             travel_s = max(away[0] / float(speed_rad_s[:2].min()), away[1] / float(speed_rad_s[2]))
             self._until_s = now_s + travel_s + self._dwell_s

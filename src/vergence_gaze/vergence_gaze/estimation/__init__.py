@@ -1,1 +1,1 @@
-"""Where the target is: sightings to an estimate of its direction, depth and motion."""
+"""Where the target is: observations to an estimate of its direction, depth and motion."""

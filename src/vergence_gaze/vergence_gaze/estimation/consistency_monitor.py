@@ -1,7 +1,7 @@
-"""Whether those who tell the target's vergence agree: the fovea, the class-free tracker and the boxes.
+"""Whether the estimators of the target's vergence agree: the fovea, the class-free tracker and the boxes.
 
-The tracker and the boxes follow the target itself, the fovea tells of whatever lies there: past a small target it sees
-the background. Boxes know what the target is, so where they are present they decide who is right.
+The tracker and the boxes follow the target itself, the fovea measures whatever lies there: past a small target, the
+background. Boxes identify the target, so where they are present they decide which of the others is right.
 """
 
 import math
@@ -13,11 +13,11 @@ _ENOUGH_PAIRS, _ENOUGH_PAIRS_MOVING, _MOST_PAIRS = 10, 24, 30
 _SILENT_S = 0.3
 _MEMORY = 0.7
 _SMOOTHED = math.sqrt((1.0 - _MEMORY) / (1.0 + _MEMORY))
-_SURE = 3.0
+_GATE_SIGMA = 3.0
 _ALWAYS_RAD = 0.003
 
 
-class Agreement:
+class ConsistencyMonitor:
     """Compares vergences [rad] of the same pairs. `own_depth_rad` is what the object's own depth explains."""
 
     def __init__(self, disagreement_rad: float) -> None:
@@ -25,7 +25,7 @@ class Agreement:
         self.clear()
 
     def clear(self) -> None:
-        """Nothing has been compared."""
+        """Forget all comparisons."""
         self._fovea: deque[tuple[float, float]] = deque(maxlen=30)
         self._track: deque[tuple[float, float]] = deque(maxlen=30)
         self._track_own_depth_rad = 0.0
@@ -36,36 +36,36 @@ class Agreement:
     def disagreement(self, moving: bool) -> bool:
         """True while two estimators differ by more than the object's own depth explains, and no box decides.
 
-        Of a moving target it takes longer: it passes before others, and eyes that hold still would lose it.
+        For a moving target it takes longer: it passes in front of others, and eyes that hold still would lose it.
         """
-        return self._differing >= (_ENOUGH_PAIRS_MOVING if moving else _ENOUGH_PAIRS) and self._both_speak
+        return self._differing >= (_ENOUGH_PAIRS_MOVING if moving else _ENOUGH_PAIRS) and self._both_recent
 
     @property
-    def doubtful(self) -> bool:
-        """True if estimators have just differed, though not for long enough to call it a disagreement."""
-        return self._differing > 0 and self._both_speak
+    def differing(self) -> bool:
+        """True if estimators have just differed, though not yet for long enough to be a disagreement."""
+        return self._differing > 0 and self._both_recent
 
     @property
-    def _both_speak(self) -> bool:
-        """False once the fovea tells nothing any more while the tracker goes on."""
+    def _both_recent(self) -> bool:
+        """False once the fovea has no measurements any more while the tracker goes on."""
         return bool(self._track and self._fovea) and self._track[-1][0] - self._fovea[-1][0] < _SILENT_S
 
     def track_is_fresh(self, stamp_s: float, within_s: float) -> bool:
-        """Tell whether the tracker has told a vergence lately."""
+        """Return whether the tracker has measured the vergence lately."""
         return bool(self._track) and stamp_s - self._track[-1][0] < within_s
 
-    def see_track(self, stamp_s: float, vergence_rad: float, own_depth_rad: float) -> None:
-        """Take the tracker's vergence of a pair."""
+    def update_track(self, stamp_s: float, vergence_rad: float, own_depth_rad: float) -> None:
+        """Add the tracker's vergence of a pair."""
         self._track.append((stamp_s, vergence_rad))
         self._track_own_depth_rad = own_depth_rad
 
     def drop_track(self) -> None:
-        """The tracker is not heeded any more."""
+        """Forget the tracker's measurements: its track is not the target."""
         self._track.clear()
         self._track_off, self._differing = _Mean(), 0
 
-    def see_fovea(self, stamp_s: float, vergence_rad: float) -> None:
-        """Take the fovea's vergence of a pair, and hold it against the tracker's of the same pair."""
+    def update_fovea(self, stamp_s: float, vergence_rad: float) -> None:
+        """Add the fovea's vergence of a pair, and compare it with the tracker's of the same pair."""
         self._fovea.append((stamp_s, vergence_rad))
         if not self._track or abs(self._track[-1][0] - stamp_s) > 1e-6:
             if not self.track_is_fresh(stamp_s, _FRESH_S):
@@ -73,37 +73,37 @@ class Agreement:
             return
         if abs(vergence_rad - self._track[-1][1]) <= self._disagreement_rad + self._track_own_depth_rad:
             self._differing = max(self._differing - 2, 0)
-        elif self._boxes_are_fresh(stamp_s) and self.fovea_is_astray(stamp_s) != self.track_is_astray(stamp_s):
+        elif self._boxes_are_fresh(stamp_s) and self.fovea_inconsistent(stamp_s) != self.track_inconsistent(stamp_s):
             self._differing = 0
         else:
             self._differing = min(self._differing + 1, _MOST_PAIRS)
 
-    def see_box(self, stamp_s: float, vergence_rad: float, sigma_rad: float, own_depth_rad: float) -> None:
-        """Take the boxes' vergence of a pair; boxes are slow, so that the others' of that pair are known by then."""
+    def update_box(self, stamp_s: float, vergence_rad: float, sigma_rad: float, own_depth_rad: float) -> None:
+        """Add the boxes' vergence of a pair; boxes are slow, so that the others' of that pair have arrived by then."""
         if not math.isfinite(vergence_rad):
             return
         if not self._boxes_are_fresh(stamp_s):
             self._fovea_off, self._track_off = _Mean(), _Mean()
         self._box_s, self._box_rad = max(stamp_s, self._box_s), vergence_rad
         self._box_sigma_rad, self._box_own_depth_rad = sigma_rad, own_depth_rad
-        self._fovea_off.take(vergence_rad, self._fovea, stamp_s)
-        self._track_off.take(vergence_rad, self._track, stamp_s)
+        self._fovea_off.update(vergence_rad, self._fovea, stamp_s)
+        self._track_off.update(vergence_rad, self._track, stamp_s)
 
-    def fovea_is_astray(self, stamp_s: float) -> bool:
-        """Tell whether the boxes say that the fovea looks past the target."""
+    def fovea_inconsistent(self, stamp_s: float) -> bool:
+        """Return whether, by the boxes, the fovea looks past the target."""
         return self._boxes_are_fresh(stamp_s) and self._fovea_off.beyond(self._box_own_depth_rad, self._box_sigma_rad)
 
-    def track_is_astray(self, stamp_s: float) -> bool:
-        """Tell whether the boxes say that the tracker follows something else."""
+    def track_inconsistent(self, stamp_s: float) -> bool:
+        """Return whether, by the boxes, the tracker follows another object."""
         return self._boxes_are_fresh(stamp_s) and self._track_off.beyond(self._box_own_depth_rad, self._box_sigma_rad)
 
-    def fovea_may_be_the_target(self, stamp_s: float, vergence_rad: float) -> bool:
-        """Tell whether this vergence at the fovea may be the target's, by all that boxes have said."""
+    def accepts_fovea(self, stamp_s: float, vergence_rad: float) -> bool:
+        """Return whether this vergence at the fovea may be the target's, by the boxes so far."""
         if not self._boxes_are_fresh(stamp_s):
             return True
         if self._fovea_off.count >= 2:
             return not self._fovea_off.beyond(self._box_own_depth_rad, self._box_sigma_rad)
-        bound_rad = self._box_own_depth_rad + _ALWAYS_RAD + _SURE * self._box_sigma_rad
+        bound_rad = self._box_own_depth_rad + _ALWAYS_RAD + _GATE_SIGMA * self._box_sigma_rad
         return abs(vergence_rad - self._box_rad) <= bound_rad
 
     @property
@@ -127,7 +127,7 @@ class _Mean:
         self.count = 0
         self.value_rad = 0.0
 
-    def take(self, box_rad: float, others: deque[tuple[float, float]], stamp_s: float) -> None:
+    def update(self, box_rad: float, others: deque[tuple[float, float]], stamp_s: float) -> None:
         same = [value for other_s, value in others if abs(other_s - stamp_s) < _SAME_PAIR_S]
         if not same:
             return
@@ -139,4 +139,4 @@ class _Mean:
         if self.count < 2:
             return False
         spread_rad = sigma_rad * max(_SMOOTHED, 1.0 / math.sqrt(self.count))
-        return abs(self.value_rad) > own_depth_rad + _ALWAYS_RAD + _SURE * spread_rad
+        return abs(self.value_rad) > own_depth_rad + _ALWAYS_RAD + _GATE_SIGMA * spread_rad

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from vergence_gaze.estimation.kalman import Measurement
 from vergence_gaze.estimation.observations import BoxSighting, TrackSighting
-from vergence_gaze.joints.joint_history import JointHistory
+from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_rig.geometry import UnreachableError, angles_of_direction, gaze_for_point, rotation_rig_from_eye
 
 Array = npt.NDArray[np.float64]
@@ -29,16 +29,16 @@ _WIDEST_RAD = 1.5
 
 
 class SightingError(ValueError):
-    """A sighting that gives no direction: not finite, outside any lens, or older than what is known of the joints."""
+    """A sighting that gives no direction: not finite, outside any lens, or older than the joint history."""
 
 
 def direction_angles(pan_rad: float, tilt_rad: float, x: float, y: float) -> tuple[float, float]:
     """Return (pan, tilt) [rad] that would bring normalised image coordinates (x right, y down) to the fovea.
 
-    Raises SightingError for coordinates that are not finite or absurd.
+    Raises SightingError for coordinates that are not finite or too large.
     """
     if not (abs(x) <= _LARGEST_TANGENT and abs(y) <= _LARGEST_TANGENT):
-        raise SightingError(f"normalised coordinates are ({x:g}, {y:g}): allowed is at most {_LARGEST_TANGENT:g}")
+        raise SightingError(f"normalised coordinates must be within +-{_LARGEST_TANGENT:g}: got ({x:g}, {y:g})")
     try:
         return angles_of_direction(rotation_rig_from_eye(pan_rad, tilt_rad) @ (1.0, -x, -y))
     except UnreachableError as error:
@@ -57,7 +57,7 @@ def spread_of_eye(left: bool, direction_sigma_rad: float, vergence_sigma_rad: fl
 
 
 def one_eye(
-    history: JointHistory, left: bool, stamp_s: float, x: float, y: float, sigma_rad: float
+    history: ShaftHistory, left: bool, stamp_s: float, x: float, y: float, sigma_rad: float
 ) -> tuple[Measurement, tuple[float, float]]:
     """Return the measurement of a direction in one eye, and that direction's (pan, tilt) [rad]."""
     joints = _joints(history, stamp_s)
@@ -67,7 +67,7 @@ def one_eye(
 
 
 def both_eyes(
-    history: JointHistory,
+    history: ShaftHistory,
     stamp_s: float,
     skew_s: float,
     left_xy: tuple[float, float],
@@ -90,19 +90,19 @@ def both_eyes(
 
 
 def fovea_vergence(
-    history: JointHistory, stamp_s: float, skew_s: float, disparity_rad: float, sigma_rad: float
+    history: ShaftHistory, stamp_s: float, skew_s: float, disparity_rad: float, sigma_rad: float
 ) -> Measurement:
     """Return the measurement of the vergence that fixates what lies at the left fovea."""
     at_left, at_right = _joints(history, stamp_s), _joints(history, stamp_s + skew_s)
     if not abs(disparity_rad) < 1.5:
-        raise SightingError(f"disparity is {disparity_rad:g} rad: allowed is less than 1.5")
+        raise SightingError(f"the disparity must be less than 1.5 rad: got {disparity_rad:g}")
     right_pan, _ = direction_angles(at_right[1], at_right[2], math.tan(-disparity_rad), 0.0)
     value = right_pan - float(at_left[0])
     return Measurement(np.array([_VERGENCE]), np.array([value]), np.array([sigma_rad]), np.array([stamp_s]))
 
 
 def point(
-    history: JointHistory, stamp_s: float, point_m: tuple[float, float, float], baseline_m: float, sigma_rad: float
+    history: ShaftHistory, stamp_s: float, point_m: tuple[float, float, float], baseline_m: float, sigma_rad: float
 ) -> Measurement:
     """Return the measurement of a point in rig_base."""
     try:
@@ -115,7 +115,7 @@ def point(
 
 
 def track(
-    history: JointHistory, sighting: TrackSighting, sigma_rad: float, disparity_sigma_rad: float
+    history: ShaftHistory, sighting: TrackSighting, sigma_rad: float, disparity_sigma_rad: float
 ) -> tuple[Measurement, Array]:
     """Return the measurement of a track, and (left pan, right pan, tilt) (3,) [rad] of what it follows.
 
@@ -133,7 +133,7 @@ def track(
 
 
 def box(
-    history: JointHistory, sighting: BoxSighting, sigma_rad: float, disparity_sigma_rad: float = 0.0
+    history: ShaftHistory, sighting: BoxSighting, sigma_rad: float, disparity_sigma_rad: float = 0.0
 ) -> tuple[Measurement, Array]:
     """Return the measurement of a detected target, and its (left pan, right pan, tilt) (3,) [rad], NaN where unseen.
 
@@ -165,7 +165,7 @@ def _tangent(angle_rad: float) -> float:
     return math.tan(angle_rad) if abs(angle_rad) < _WIDEST_RAD else math.nan
 
 
-def _joints(history: JointHistory, stamp_s: float) -> Array:
+def _joints(history: ShaftHistory, stamp_s: float) -> Array:
     if not (math.isfinite(stamp_s) and history.covers(stamp_s)):
-        raise SightingError(f"stamp is {stamp_s!r} s: no joint angles are known for it")
+        raise SightingError(f"the stamp must be within the joint history: got {stamp_s!r} s")
     return history.shaft_at(stamp_s)

@@ -1,8 +1,8 @@
-"""How far the target is, and how sure that is.
+"""Where the target is, with covariance and a 95 % interval of its distance.
 
-The shaft of a hobby servo lies somewhere in its dead band and play; the side it came from tells where, as far as the
-servo is like its data sheet. The vergence that the filter believes in, however steady, carries what is left of that
-doubt: half a degree is 13 cm at one metre.
+The shaft of a hobby servo lies somewhere in its dead band and play; the side it came from gives where, as far as the
+servo is like its data sheet. The rest of that uncertainty is in the filter's vergence, however steady it is: half a
+degree is 13 cm at one metre.
 """
 
 import math
@@ -19,10 +19,10 @@ from vergence_rig.rig import Rig
 Array = npt.NDArray[np.float64]
 
 _TO_95_PERCENT = 1.9  # servo errors are bounded: their tails are lighter than a normal distribution has
-_PLAY_DOUBT = 0.22 / math.sqrt(3.0)
-"""Dead band and play of a servo are each within a fifth or so of its data sheet; which side it rests on is known."""
+_PLAY_SIGMA_SHARE = 0.22 / math.sqrt(3.0)
+"""Dead band and play of a servo are each within a fifth or so of its data sheet; on which side it rests is modelled."""
 _SHARED_NOISE = 1.6
-"""Estimators that read the same pair share its noise, which the filter takes for independent."""
+"""Estimators that read the same pair share its noise, which the filter assumes to be independent."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,10 @@ UNKNOWN = TargetPosition(np.full(3, math.nan), np.full((3, 3), math.nan), math.n
 
 
 def joint_variances(rig: Rig) -> Array:
-    """Return what is not known of each shaft at rest (3,) [rad^2] although its play is modelled."""
+    """Return the variance of each shaft at rest (3,) [rad^2] that is left although its play is modelled."""
     return np.array(
         [
-            (_PLAY_DOUBT * 0.5 * math.hypot(servo.dead_band_rad, servo.backlash_rad)) ** 2
+            (_PLAY_SIGMA_SHARE * 0.5 * math.hypot(servo.dead_band_rad, servo.backlash_rad)) ** 2
             + servo.pulse_step_rad**2 / 12.0
             for servo in (joint.servo for _, joint in rig.joints.items())
         ]
@@ -55,7 +55,7 @@ def target_position(
 ) -> TargetPosition:
     """Return the target's position from the filter's estimate and the shafts' variances (3,) [rad^2].
 
-    With an `offset` the visual encoder's knowledge stands in for what is not known of the pans.
+    With an `offset` the visual encoder's variance replaces that of the pans.
     """
     left, right, tilt = shaft_variances
     if offset is not None:

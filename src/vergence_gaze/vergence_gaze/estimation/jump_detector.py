@@ -1,4 +1,4 @@
-"""What two sightings that neither fitted the estimate say of a target: is it elsewhere, and does it move?"""
+"""Two measurements outside the gate: is the target elsewhere, and does it move?"""
 
 import numpy as np
 import numpy.typing as npt
@@ -8,21 +8,21 @@ from vergence_gaze.estimation.kalman import Measurement
 Array = npt.NDArray[np.float64]
 
 RATE_SIGMA_RAD_S = 0.5
-"""How fast targets of which nothing is known move."""
+"""Standard deviation of an unknown target's speed."""
 _ONE_PAIR_S = 0.01
 
 
-def agree(before: Measurement, after: Measurement) -> bool:
-    """Tell whether two measurements may be of one thing."""
-    allowed = 5.0 * np.hypot(before.sigmas, after.sigmas)
-    allowed = allowed + 2.0 * RATE_SIGMA_RAD_S * max(after.stamp_s - before.stamp_s, 0.0)
-    return bool((np.abs(before.values - after.values) <= allowed).all())
+def consistent(before: Measurement, after: Measurement) -> bool:
+    """Return whether two measurements may be of one object."""
+    bound = 5.0 * np.hypot(before.sigmas, after.sigmas)
+    bound = bound + 2.0 * RATE_SIGMA_RAD_S * max(after.stamp_s - before.stamp_s, 0.0)
+    return bool((np.abs(before.values - after.values) <= bound).all())
 
 
-def goes_on(before: Measurement, after: Measurement, bound: float) -> bool:
-    """Tell whether a target was on its way from one measurement to the next, by their squared distance in deviations.
+def continues_moving(before: Measurement, after: Measurement, bound: float) -> bool:
+    """Return whether a target moved on from one measurement to the next, by their squared Mahalanobis distance.
 
-    What has jumped stays where it is then. Less than both eyes' directions, or one pair twice, tells of no motion.
+    A target that has jumped stays there. Less than both eyes' directions, or one pair twice, shows no motion.
     """
     if len(after.values) < 3 or not after.stamp_s - before.stamp_s > _ONE_PAIR_S:
         return False
@@ -30,8 +30,8 @@ def goes_on(before: Measurement, after: Measurement, bound: float) -> bool:
     return bool((np.square(before.values - after.values) / spread).sum() > bound)
 
 
-def speed(before: Measurement, after: Measurement) -> tuple[Array, float]:
-    """Return the rates (3,) between two places of a target that was thought to be elsewhere, and their variance."""
+def rates_between(before: Measurement, after: Measurement) -> tuple[Array, float]:
+    """Return the rates (3,) between two places of a target that was expected elsewhere, and their variance."""
     prior = RATE_SIGMA_RAD_S**2
     duration_s = after.stamp_s - before.stamp_s
     if not duration_s > _ONE_PAIR_S:

@@ -1,7 +1,7 @@
 """A Kalman filter on the version, vergence and tilt that fixate a target, and what is measured of them.
 
 State (6,): version, its rate, vergence, its rate, tilt, its rate [rad, rad/s], all in the frame of the joints as they
-are estimated, so that what the filter says is what has to be commanded. Directions measured in one eye are linear in
+are estimated, so that the estimate is what has to be commanded. Directions measured in one eye are linear in
 it, at any distance: the left eye's pan to the target is version - vergence / 2, the right eye's version + vergence / 2.
 """
 
@@ -17,7 +17,7 @@ VERSION, VERGENCE, TILT = 0, 2, 4
 _DEPTH_SHARE = 0.25
 """Vergence accelerates less than directions do: a quarter of it at 0.5 m already is a metre per second squared."""
 _RATE_HOLDS_S = 0.15
-"""A measurement that is later than this is believed the less, the more a target may change its speed."""
+"""A measurement later than this gets more noise: the more a target may accelerate, the more."""
 
 
 @dataclass(frozen=True)
@@ -37,31 +37,32 @@ class Measurement:
         """The pair's stamp: the first row's."""
         return float(self.stamps_s[0])
 
-    def alike(self, other: "Measurement") -> bool:
-        """Tell whether another measurement is of the same kind."""
+    def same_kind(self, other: "Measurement") -> bool:
+        """Return whether another measurement has the same coefficients."""
         return np.array_equal(self.coefficients, other.coefficients)
 
 
 @dataclass(frozen=True)
-class Fit:
-    """How a model met a measurement: design (n, 6), innovation (n,), its covariance (n, n) and squared distance.
+class Innovation:
+    """A measurement minus a model's prediction: `value` (n,) with its `covariance` (n, n).
 
-    `noise` (n,) are the measurement's variances, as far as this model can believe it.
+    `jacobian` (n, 6) is of the measurement by the state, `noise` (n,) the measurement's variances for this model, and
+    `distance` the squared Mahalanobis distance.
     """
 
-    design: Array
-    innovation: Array
+    jacobian: Array
+    value: Array
     noise: Array
-    spread: Array
+    covariance: Array
     distance: float
 
     @property
-    def loss(self) -> float:
-        """Negative logarithm of the likelihood, but for a constant."""
-        return 0.5 * (self.distance + math.log(np.linalg.det(self.spread)))
+    def negative_log_likelihood(self) -> float:
+        """Negative logarithm of the likelihood, without its constant term."""
+        return 0.5 * (self.distance + math.log(np.linalg.det(self.covariance)))
 
 
-class Kalman:
+class KalmanFilter:
     """One model. `acceleration` > 0: constant velocity with that random acceleration; 0: at rest with random walk."""
 
     def __init__(self, acceleration_rad_s2: float, drift_rad_sqrt_s: float) -> None:
@@ -75,7 +76,7 @@ class Kalman:
         self.state = np.zeros(6)
         self.covariance = np.zeros((6, 6))
 
-    def advance(self, duration_s: float) -> None:
+    def predict(self, duration_s: float) -> None:
         """Predict the state `duration_s` ahead."""
         transition = np.eye(6)
         noise = np.zeros((6, 6))
@@ -88,24 +89,25 @@ class Kalman:
         self.state = transition @ self.state
         self.covariance = transition @ self.covariance @ transition.T + noise
 
-    def fit(self, measurement: Measurement, now_s: float) -> Fit:
-        """Hold a measurement against the state, which is of `now_s`: stamps may be earlier or later than that."""
-        design = np.zeros((len(measurement.values), 6))
-        design[:, 0::2] = measurement.coefficients
+    def innovation(self, measurement: Measurement, now_s: float) -> Innovation:
+        """Compare a measurement with the state, which is of `now_s`; stamps may be earlier or later than that."""
+        jacobian = np.zeros((len(measurement.values), 6))
+        jacobian[:, 0::2] = measurement.coefficients
         if self.moves:
-            design[:, 1::2] = measurement.coefficients * (measurement.stamps_s - now_s)[:, None]
+            jacobian[:, 1::2] = measurement.coefficients * (measurement.stamps_s - now_s)[:, None]
         noise = measurement.sigmas**2
         late_s = now_s - measurement.stamp_s - _RATE_HOLDS_S
         if self.moves and late_s > 0:
             noise = noise + (0.5 * self._accelerations[VERSION] * late_s**2) ** 2
-        spread = design @ self.covariance @ design.T + np.diag(noise)
-        innovation = measurement.values - design @ self.state
-        return Fit(design, innovation, noise, spread, float(innovation @ np.linalg.solve(spread, innovation)))
+        covariance = jacobian @ self.covariance @ jacobian.T + np.diag(noise)
+        value = measurement.values - jacobian @ self.state
+        distance = float(value @ np.linalg.solve(covariance, value))
+        return Innovation(jacobian, value, noise, covariance, distance)
 
-    def correct(self, fit: Fit) -> None:
-        """Take the measurement that `fit` is of."""
-        gain = np.linalg.solve(fit.spread, fit.design @ self.covariance).T
-        self.state = self.state + gain @ fit.innovation
+    def update(self, innovation: Innovation) -> None:
+        """Correct the state by the measurement of `innovation`."""
+        gain = np.linalg.solve(innovation.covariance, innovation.jacobian @ self.covariance).T
+        self.state = self.state + gain @ innovation.value
         # Joseph's form: the short one loses its positive variances where a certain measurement meets a vague prior.
-        kept = np.eye(6) - gain @ fit.design
-        self.covariance = kept @ self.covariance @ kept.T + (gain * fit.noise) @ gain.T
+        kept = np.eye(6) - gain @ innovation.jacobian
+        self.covariance = kept @ self.covariance @ kept.T + (gain * innovation.noise) @ gain.T

@@ -1,6 +1,6 @@
-"""What the target is followed by once it has been given: which track, which boxes, and how far beside them it lies.
+"""Which track and which boxes belong to the target, and the target's offset from them.
 
-What was asked for may lie beside the middle of what is tracked or detected; that offset is kept.
+The requested point may lie beside the middle of what is tracked or detected; that offset is kept.
 """
 
 import math
@@ -13,7 +13,7 @@ from vergence_gaze.estimation.target_filter import TargetEstimate
 
 Array = npt.NDArray[np.float64]
 
-_SURE = 4.0
+_GATE_SIGMA = 4.0
 _BOX_MARGIN_RAD = 0.01
 _BOXES_TO_LEARN = 5
 _LATER_SHARE = 0.01
@@ -24,18 +24,18 @@ _NOWHERE: Array = np.full(3, math.nan)
 
 
 class TrackLock:
-    """The one track that is the target's."""
+    """The track that follows the target, with the target's offset (2,) from it in pan and tilt [rad]."""
 
     def __init__(self) -> None:
         self.track_id: int | None = None
         self.offset = np.zeros(2)
-        self._refused_id: int | None = None
+        self._rejected_id: int | None = None
         self._compared = self._beside = 0
         self._seen: deque[tuple[float, int, Array]] = deque(maxlen=30)
 
-    def refuse(self) -> None:
-        """The track is something else's: do not take it again."""
-        self._refused_id, self.track_id = self.track_id, None
+    def reject(self) -> None:
+        """Release the track, which follows another object, and do not adopt it again."""
+        self._rejected_id, self.track_id = self.track_id, None
 
     def adopt(
         self,
@@ -45,17 +45,18 @@ class TrackLock:
         radius_rad: float,
         depth_margin_rad: float,
     ) -> str:
-        """Take a track at `seen_rad` (left pan, right pan, tilt) for the target's; return why not, or nothing."""
+        """Adopt a track at `seen_rad` (left pan, right pan, tilt) as the target's; returns why not, or ""."""
         offset = (estimate.joints_rad - seen_rad)[[0, 2]]
         deeper = float(seen_rad[1] - seen_rad[0]) - estimate.vergence_rad
         vergence_off_rad = deeper if math.isfinite(deeper) else 0.0
         distance = float(np.hypot(*offset))
-        if track_id == self._refused_id:
-            return "the tracker follows something that the boxes say is not the target"
+        if track_id == self._rejected_id:
+            return "the tracker follows an object that, by the boxes, is not the target"
         if distance > radius_rad:
-            return f"the tracker follows something {math.degrees(distance):.1f} deg away"
-        if abs(vergence_off_rad) > _SURE * float(estimate.sigmas_rad[1]) + depth_margin_rad:
-            return f"the tracker follows something {math.degrees(vergence_off_rad):.1f} deg nearer or farther"
+            return f"the tracker follows an object {math.degrees(distance):.1f} deg away from the target"
+        if abs(vergence_off_rad) > _GATE_SIGMA * float(estimate.sigmas_rad[1]) + depth_margin_rad:
+            deeper_deg = math.degrees(vergence_off_rad)
+            return f"the tracker follows an object whose vergence is {deeper_deg:.1f} deg off the target's"
         # The first lock after a click keeps the click. A tracker that did not lock anew because the move was small
         # still follows its old target next to it.
         first = self.track_id is None
@@ -63,12 +64,12 @@ class TrackLock:
         self.track_id = track_id
         return ""
 
-    def take(self, stamp_s: float, track_id: int, seen_rad: Array) -> None:
-        """Keep where a track was, at `seen_rad` (left pan, right pan, tilt), for who is slower to say."""
+    def add(self, stamp_s: float, track_id: int, seen_rad: Array) -> None:
+        """Keep where a track was, at `seen_rad` (left pan, right pan, tilt), to compare with slower boxes."""
         self._seen.append((stamp_s, track_id, seen_rad))
 
     def place_at(self, stamp_s: float) -> Array | None:
-        """Return pan and tilt (2,) of the target as its track has it in a pair, None if it was not seen there."""
+        """Return pan and tilt (2,) of the target in a pair by its track; None without one."""
         track_id, seen_rad = self._in_pair(stamp_s)
         return seen_rad[[0, 2]] + self.offset if track_id is not None and track_id == self.track_id else None
 
@@ -76,10 +77,10 @@ class TrackLock:
         same = [(track_id, seen) for seen_s, track_id, seen in self._seen if abs(seen_s - stamp_s) < _SAME_PAIR_S]
         return same[-1] if same else (None, _NOWHERE)
 
-    def hold_against(self, stamp_s: float, target_rad: Array) -> None:
-        """Learn the offset from where boxes have the target (left pan, right pan, tilt) in a pair.
+    def correct_offset(self, stamp_s: float, target_rad: Array) -> None:
+        """Correct the offset by the target's place (left pan, right pan, tilt) in the boxes of a pair.
 
-        A track slips along what it follows, and may have locked on beside it; boxes are around the same thing always.
+        A track slips along its object, and may have locked on beside it; boxes always surround the same object.
         """
         place = self.place_at(stamp_s)
         if place is None or not np.isfinite(target_rad[[0, 2]]).all():
@@ -90,24 +91,26 @@ class TrackLock:
     def adopt_by_class(
         self, stamp_s: float, estimate: TargetEstimate, target_rad: Array, extent_rad: float, depth_margin_rad: float
     ) -> None:
-        """Take the track that boxes of the wanted class show to follow the same thing in one pair.
+        """Adopt the track that follows the same object as boxes of the requested class in one pair.
 
         Args:
             stamp_s: of the pair.
             estimate: of the target then, with these boxes and all before them.
             target_rad: (left pan, right pan, tilt) (3,) of the boxes' middles; NaN where one eye has none.
             extent_rad: how wide the boxes are.
-            depth_margin_rad: by how much vergence may differ over the thing.
+            depth_margin_rad: by how much vergence may differ over the object.
         """
         track_id, seen_rad = self._in_pair(stamp_s)
-        if track_id in (None, self.track_id, self._refused_id):
+        if track_id in (None, self.track_id, self._rejected_id):
             return
         if _is_within(seen_rad[[0, 2]], seen_rad, target_rad, extent_rad, depth_margin_rad):
             self.track_id, self.offset, self._compared = track_id, (estimate.joints_rad - seen_rad)[[0, 2]], 2
             self._beside = 0
 
-    def hold_against_class(self, stamp_s: float, target_rad: Array, extent_rad: float, depth_margin_rad: float) -> bool:
-        """Learn the offset from boxes of the wanted class; False once two in a row say that the track is another's.
+    def correct_offset_by_class(
+        self, stamp_s: float, target_rad: Array, extent_rad: float, depth_margin_rad: float
+    ) -> bool:
+        """Correct the offset by boxes of the requested class; False once two in a row contradict the track.
 
         Arguments as in `adopt_by_class`.
         """
@@ -116,29 +119,28 @@ class TrackLock:
             return True
         if _is_within(place, seen_rad, target_rad, extent_rad, depth_margin_rad):
             self._beside = 0
-            self.hold_against(stamp_s, target_rad)
+            self.correct_offset(stamp_s, target_rad)
         else:
             self._beside += 1
         return self._beside < _BESIDE_BOXES
 
 
 class BoxLock:
-    """The boxes that are the target's although another thing than a class was asked for: those that contain it."""
+    """The boxes that contain a target that was not requested by its class."""
 
     def __init__(self) -> None:
-        self.lose()
+        self.release()
 
-    def lose(self) -> None:
-        """The boxes are something else's."""
+    def release(self) -> None:
+        """Release the boxes, which are another object's."""
         self.adopted = False
         self.offset = np.zeros(2)
         self._learnt = 0
 
     def adopt(self, seen_rad: Array, extent_rad: float, vergence_bound_rad: float, estimate: TargetEstimate) -> bool:
-        """Tell whether boxes with middles at `seen_rad` (left pan, right pan, tilt) are the target's.
+        """Return whether boxes with middles at `seen_rad` (left pan, right pan, tilt) are the target's.
 
-        The first of them tell how far it lies beside their middles. A single box is as wide as high, for all that is
-        known.
+        The first of them give its offset from their middles. A single box is assumed to be as wide as high.
         """
         off = estimate.joints_rad - seen_rad
         pan_off = off[0] if math.isfinite(off[0]) else off[1]
@@ -147,19 +149,18 @@ class BoxLock:
         sigma = float(max(estimate.sigmas_rad[0], estimate.sigmas_rad[2]))
         deeper = abs(float(off[1] - off[0]))
         if not np.abs(beside).max() <= half + _BOX_MARGIN_RAD + min(sigma, half) or deeper > vergence_bound_rad:
-            self.lose()
+            self.release()
             return False
         if not self.adopted:
             self.adopted = True
             self._learn(beside)
         return True
 
-    def hold_against(self, seen_rad: Array, place_rad: Array | None) -> None:
-        """Learn the offset of boxes with middles at `seen_rad` from the target's pan and tilt (2,) by its track.
+    def correct_offset(self, seen_rad: Array, place_rad: Array | None) -> None:
+        """Correct the offset from boxes with middles at `seen_rad` by the target's pan and tilt (2,) in its track.
 
-        Only from that: what was told by boxes alone would teach them that a target that moves lies farther and farther
-        beside them. What was asked for is known best at first; later the boxes are what a track that slips is held
-        against.
+        Only by that: from boxes alone the offset of a moving target would grow and grow. The requested point is known
+        best at first; later a track that slips is corrected by the boxes.
         """
         if place_rad is not None and np.isfinite(seen_rad[[0, 2]]).all():
             self._learn(place_rad - seen_rad[[0, 2]])
@@ -173,7 +174,7 @@ class BoxLock:
 def _is_within(
     place_rad: Array, seen_rad: Array, target_rad: Array, extent_rad: float, depth_margin_rad: float
 ) -> bool:
-    """Tell whether what is at pan and tilt (2,) and seen at (3,) may be what the boxes are around."""
+    """Return whether what is at pan and tilt (2,) and seen at (3,) may be the object in the boxes."""
     beside = float(np.abs(place_rad - target_rad[[0, 2]]).max())
     deeper = abs(float((seen_rad[1] - seen_rad[0]) - (target_rad[1] - target_rad[0])))
     return beside <= 0.5 * extent_rad + _BOX_MARGIN_RAD and not deeper > depth_margin_rad

@@ -1,4 +1,4 @@
-"""What the controller is told: joints, disparities, tracks, boxes, points. Times are seconds of one clock.
+"""The controller's inputs: joints, disparities, tracks, boxes, points. Times are seconds of one clock.
 
 Normalised image coordinates are undistorted x/z, y/z in the eye's optical frame (x right, y down). Values that are not
 known are NaN.
@@ -19,7 +19,7 @@ class JointReport:
 
 @dataclass(frozen=True)
 class JointResolution:
-    """The smallest step of each joint [rad] by name, as the servos' driver really has it."""
+    """The smallest step of each joint [rad] by name, as the servos' driver can set it."""
 
     stamp_s: float
     steps_rad: Mapping[str, float]
@@ -40,7 +40,7 @@ class FoveaDisparity:
 
 @dataclass(frozen=True)
 class TrackSighting:
-    """Where the class-free tracker has its target: normalised left coordinates and disparity.
+    """The target of the class-free tracker: normalised left coordinates and disparity.
 
     `disparity_rad` is NaN while the right eye does not see it; `usable` is False while locking or lost.
     """
@@ -92,20 +92,19 @@ class PointSighting:
 
 
 @dataclass(frozen=True)
-class EdgeJudgement:
-    """Metric I as the judge sees it: contrast in its window, the metric node's own verdict, and the raw metric [px]."""
+class EdgeContrast:
+    """Metric I at the fovea: the contrast of its best small window, and the raw metric of that window [px]."""
 
     stamp_s: float
     contrast: float
     metric_px: float
-    verged: bool
 
 
 @dataclass(frozen=True)
-class EyeRotationReading:
+class EyeRotationObservation:
     """The cameras' true vergence [rad] in a pair, from background features, with its standard deviation.
 
-    `usable` is False where the visual encoder could not tell; `reason` says why.
+    `usable` is False where the visual encoder has no reading; `reason` says why.
     """
 
     stamp_s: float
@@ -123,6 +122,6 @@ Observation: TypeAlias = (
     | TrackSighting
     | BoxSighting
     | PointSighting
-    | EdgeJudgement
-    | EyeRotationReading
+    | EdgeContrast
+    | EyeRotationObservation
 )

@@ -1,7 +1,7 @@
 """Where the target is: at rest or in motion, whichever has explained the recent measurements better.
 
-A target at rest is believed to be at rest, so that noise does not move the eyes; one in motion is predicted along its
-speed (`motion.py`). A jump looks like an outlier until a second one agrees with it.
+A model at rest keeps noise from moving the eyes; one in motion predicts along the target's speed (`imm_filter.py`). A
+jump looks like an outlier until a second measurement is consistent with it.
 """
 
 import math
@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_gaze.estimation import jump_detector as jumps
-from vergence_gaze.estimation.imm_filter import Motion
+from vergence_gaze.estimation.imm_filter import ImmFilter
 from vergence_gaze.estimation.jump_detector import RATE_SIGMA_RAD_S
-from vergence_gaze.estimation.kalman import TILT, VERGENCE, VERSION, Fit, Kalman, Measurement
+from vergence_gaze.estimation.kalman import TILT, VERGENCE, VERSION, Innovation, KalmanFilter, Measurement
 
 Array = npt.NDArray[np.float64]
 
@@ -22,7 +22,7 @@ _EVIDENCE_FADE = 0.8
 _EVIDENCE_TO_MOVE = 7.0
 _EVIDENCE_TO_REST = -2.0
 _EVIDENCE_BOUNDS = (-6.0, 15.0)
-_OF_ONE_MEASUREMENT = (-3.0, 7.5)
+_EVIDENCE_PER_MEASUREMENT = (-3.0, 7.5)
 _EVIDENCE_SURE = 11.0
 _SIGNIFICANT_RATE = 9.0
 _COAST_STRAIGHT_S = 0.15
@@ -32,7 +32,7 @@ _LONGEST_PREDICTION_S = 2.0
 _LARGEST_VARIANCE = 1.0
 _LATEST_S = 1.0
 _COMPARABLE_S = 0.5
-_BELIEVED = 0.3
+_MINIMUM_WEIGHT = 0.3
 _FOLLOWING_VARIANCE = 1e-5
 
 
@@ -92,8 +92,8 @@ class TargetFilter:
         gate_sigma: float,
         jump_count: int,
     ) -> None:
-        self._rest = Kalman(0.0, drift_rad_sqrt_s)
-        self._motion = Motion(acceleration_rad_s2, manoeuvre_rad_s2)
+        self._rest = KalmanFilter(0.0, drift_rad_sqrt_s)
+        self._motion = ImmFilter(acceleration_rad_s2, manoeuvre_rad_s2)
         self._gate = gate_sigma**2
         self._jump_count = jump_count
         self._evidence = 0.0
@@ -115,33 +115,33 @@ class TargetFilter:
 
     @property
     def moving(self) -> bool:
-        """True while the target is believed to move."""
+        """True while the model in motion explains the measurements better."""
         return self._moving
 
     @property
-    def surely_rests(self) -> bool:
-        """True while what was seen speaks for a target at rest, not only not yet for one in motion."""
+    def surely_at_rest(self) -> bool:
+        """True while the evidence is for a target at rest, not merely insufficient for one in motion."""
         return not self._moving and self._evidence < _EVIDENCE_TO_REST
 
-    def start(self, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
-        """Begin anew with a target at these angles (3,) with this covariance (3, 3), of unknown speed."""
+    def initialise(self, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
+        """Start with a target at these angles (3,) with this covariance (3, 3), of unknown speed."""
         state, whole = np.zeros(6), np.zeros((6, 6))
         state[0::2], whole[0::2, 0::2] = angles_rad, covariance
         self._rest.state, self._rest.covariance = state, whole.copy()
         whole[1::2, 1::2] = np.eye(3) * RATE_SIGMA_RAD_S**2
-        self._motion.start(state, whole)
+        self._motion.initialise(state, whole)
         self._evidence, self._moving = 0.0, False
         self._outliers.clear()
         self._time_s = stamp_s
 
-    def forget(self) -> None:
-        """There is no target any more."""
+    def clear(self) -> None:
+        """Remove the target."""
         self._time_s = math.nan
         self.last_accepted_s = math.nan
         self._outliers.clear()
 
-    def loosen(self, joint_variances: Array) -> None:
-        """Add the variances (3,) [rad^2] that a move has brought into pan_left, pan_right and tilt."""
+    def inflate_covariance(self, joint_variances: Array) -> None:
+        """Add variances (3,) [rad^2] of pan_left, pan_right and tilt, as a move of the joints leaves them."""
         left, right, tilt = joint_variances
         extra = np.zeros((6, 6))
         extra[VERSION, VERSION] = 0.25 * (left + right)
@@ -152,46 +152,48 @@ class TargetFilter:
             model.covariance = model.covariance + extra
 
     def update(self, measurement: Measurement) -> bool:
-        """Take a measurement; False if it was too late or gated out (for now: it may turn out to be a jump).
+        """Update by a measurement; returns False if it was too late or outside the gate (see `accept_jump`).
 
-        A detector is slower than a tracker, so that stamps arrive out of order: the state is taken back to the stamp
-        along its rates, which is exact at rest and good for a moving target as long as the lateness is a few frames.
+        A detector is slower than a tracker, so that stamps arrive out of order: the state is extrapolated back to the
+        stamp along its rates, which is exact at rest and good for a moving target if the delay is a few frames.
         """
         if not self.initialised or measurement.stamp_s < self._time_s - _LATEST_S:
             return False
-        self._advance(measurement.stamp_s)
-        rest, motion = self._rest.fit(measurement, self._time_s), self._motion.fits(measurement, self._time_s)
-        self.last_innovation_rad = float(np.abs(motion[0].innovation).max())
-        if not self._fits(measurement, rest, motion):
+        self._predict(measurement.stamp_s)
+        rest = self._rest.innovation(measurement, self._time_s)
+        motion = self._motion.innovations(measurement, self._time_s)
+        self.last_innovation_rad = float(np.abs(motion[0].value).max())
+        if not self._within_gate(measurement, rest, motion):
             comparable = [
                 before
                 for before in self._outliers
-                if before.alike(measurement) and measurement.stamp_s - before.stamp_s < _COMPARABLE_S
+                if before.same_kind(measurement) and measurement.stamp_s - before.stamp_s < _COMPARABLE_S
             ]
             self._outliers = [*comparable[-self._jump_count :], measurement]
             return False
-        # A depth that fits says nothing against a direction that does not.
-        self._outliers = [before for before in self._outliers if not before.alike(measurement)]
-        self._weigh(rest.loss - self._motion.loss(motion), len(measurement.values))
-        self._take(measurement, motion)
+        # A depth within the gate does not contradict a direction outside it.
+        self._outliers = [before for before in self._outliers if not before.same_kind(measurement)]
+        advantage = rest.negative_log_likelihood - self._motion.negative_log_likelihood(motion)
+        self._update_evidence(advantage, len(measurement.values))
+        self._update_models(measurement, motion)
         return True
 
-    def jump(self, measurement: Measurement) -> bool:
-        """Take a measurement that `update` has just refused, if enough before it agree: the target is elsewhere."""
-        agreeing = self._outliers[-self._jump_count :]
-        if len(agreeing) < self._jump_count or agreeing[-1] is not measurement:
+    def accept_jump(self, measurement: Measurement) -> bool:
+        """Move the target to a measurement that `update` has just rejected, if enough before it are consistent."""
+        consistent = self._outliers[-self._jump_count :]
+        if len(consistent) < self._jump_count or consistent[-1] is not measurement:
             return False
-        if not all(jumps.agree(before, measurement) for before in agreeing[:-1]):
+        if not all(jumps.consistent(before, measurement) for before in consistent[:-1]):
             return False
-        self._open(agreeing[0], measurement)
-        if jumps.goes_on(agreeing[0], measurement, self._bound(measurement)):
+        self._reopen(consistent[0], measurement)
+        if jumps.continues_moving(consistent[0], measurement, self._bound(measurement)):
             self._moving, self._evidence = True, _EVIDENCE_TO_MOVE
-        self._take(measurement, self._motion.fits(measurement, self._time_s))
+        self._update_models(measurement, self._motion.innovations(measurement, self._time_s))
         return True
 
     def at(self, time_s: float) -> TargetEstimate:
-        """Return the target at `time_s`. Speed is believed for a while and then fades, uncertainty grows on."""
-        state, spread = self._motion.mixed() if self._moving else (self._rest.state, self._rest.covariance)
+        """Return the target at `time_s`. The extrapolated speed fades after a while, the uncertainty keeps growing."""
+        state, spread = self._motion.combined() if self._moving else (self._rest.state, self._rest.covariance)
         ahead_s = min(max(time_s - self._time_s, -_LONGEST_PREDICTION_S), _LONGEST_PREDICTION_S)
         straight_s = min(ahead_s, _COAST_STRAIGHT_S)
         fade = math.exp(-(ahead_s - straight_s) / _COAST_FADE_S)
@@ -202,64 +204,64 @@ class TargetFilter:
             covariance = covariance + ahead_s * (cross + cross.T) + ahead_s**2 * spread[1::2, 1::2]
         return TargetEstimate(angles, state[1::2] * fade, covariance, self._moving)
 
-    def _advance(self, stamp_s: float) -> None:
+    def _predict(self, stamp_s: float) -> None:
         duration_s = min(stamp_s - self._time_s, _LONGEST_PREDICTION_S)
         if duration_s > 0:
-            self._rest.advance(duration_s)
-            self._motion.advance(duration_s)
+            self._rest.predict(duration_s)
+            self._motion.predict(duration_s)
             for model in (self._rest, *self._motion.modes):
                 model.covariance *= min(1.0, _LARGEST_VARIANCE / max(float(model.covariance.diagonal().max()), 1e-12))
             self._time_s = stamp_s
 
-    def _fits(self, measurement: Measurement, rest: Fit, motion: tuple[Fit, Fit]) -> bool:
-        """Tell whether a measurement may be of the target, by a model that is believed."""
+    def _within_gate(self, measurement: Measurement, rest: Innovation, motion: tuple[Innovation, Innovation]) -> bool:
+        """Return whether a measurement is within the gate of a model that has enough weight."""
         bound = self._bound(measurement)
         if not self._moving and rest.distance <= bound:
             return True
-        believed = self._motion.weights > _BELIEVED
-        return any(fit.distance <= bound for fit, yes in zip(motion, believed, strict=True) if yes)
+        likely = self._motion.weights > _MINIMUM_WEIGHT
+        return any(innovation.distance <= bound for innovation, yes in zip(motion, likely, strict=True) if yes)
 
-    def _weigh(self, advantage: float, rows: int) -> None:
-        """Add to the evidence for motion; at its end the model at rest takes over where the target is."""
-        # One row alone does not tell much: a depth that stays says nothing of a direction that moves.
-        least, most = _OF_ONE_MEASUREMENT
+    def _update_evidence(self, advantage: float, rows: int) -> None:
+        """Add to the evidence for motion; when it is used up, the model at rest takes over the target's place."""
+        # One row is weak evidence: a constant depth is compatible with a direction that moves.
+        least, most = _EVIDENCE_PER_MEASUREMENT
         evidence = _EVIDENCE_FADE ** (rows / 3.0) * self._evidence + min(max(advantage, least), most)
         self._evidence = min(max(evidence, _EVIDENCE_BOUNDS[0]), _EVIDENCE_BOUNDS[1])
         if self._moving:
             if self._evidence < _EVIDENCE_TO_REST:
                 self._moving = False
-                self._rest_where_it_moves()
+                self._copy_place_to_rest()
             return
-        state, covariance = self._motion.mixed()
+        state, covariance = self._motion.combined()
         rates, spread = state[1::2], covariance[1::2, 1::2]
         significant = float(rates @ np.linalg.solve(spread, rates)) > _SIGNIFICANT_RATE
         self._moving = self._evidence > (_EVIDENCE_TO_MOVE if significant else _EVIDENCE_SURE)
 
-    def _rest_where_it_moves(self) -> None:
-        state, covariance = self._motion.mixed()
+    def _copy_place_to_rest(self) -> None:
+        state, covariance = self._motion.combined()
         self._rest.state[0::2] = state[0::2]
         self._rest.covariance[0::2, 0::2] = covariance[0::2, 0::2] + np.eye(3) * _FOLLOWING_VARIANCE
 
-    def _take(self, measurement: Measurement, motion: tuple[Fit, Fit]) -> None:
-        self._motion.correct(motion)
-        rest = self._rest.fit(measurement, self._time_s)
+    def _update_models(self, measurement: Measurement, motion: tuple[Innovation, Innovation]) -> None:
+        self._motion.update(motion)
+        rest = self._rest.innovation(measurement, self._time_s)
         off = rest.distance / self._bound(measurement)
         if off > 1.0 and self._moving:
-            # A model at rest that no longer fits follows, so that it can take over when the target stops.
-            self._rest_where_it_moves()
+            # A model at rest outside its gate follows, so that it can take over when the target stops.
+            self._copy_place_to_rest()
         else:
             if off > 1.0:
-                # It has moved somewhat: what was known of its place counts the less, the farther off that was.
+                # It has moved somewhat: the farther, the less its old place counts.
                 self._rest.covariance = self._rest.covariance * off
-                rest = self._rest.fit(measurement, self._time_s)
-            self._rest.correct(rest)
+                rest = self._rest.innovation(measurement, self._time_s)
+            self._rest.update(rest)
         self.last_accepted_s = measurement.stamp_s
 
     def _bound(self, measurement: Measurement) -> float:
         return self._gate + 2.0 * (len(measurement.values) - 1)
 
-    def _open(self, before: Measurement, measurement: Measurement) -> None:
-        """Open the estimate for a target that is elsewhere, in the directions that the measurements tell of."""
+    def _reopen(self, before: Measurement, measurement: Measurement) -> None:
+        """Widen the estimate for a target that is elsewhere, in the directions that were measured."""
         seen = np.abs(measurement.coefficients).max(axis=0) > 0
         if not seen[0]:
             # Only the depth: the left eye, which saw it, stays where it is.
@@ -269,12 +271,14 @@ class TargetFilter:
             ways = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         else:
             ways = np.eye(3)
-        state, covariance = self._motion.mixed()
+        state, covariance = self._motion.combined()
         covariance[0::2, 0::2] += ways.T @ ways * _JUMP_SIGMA_RAD**2
         covariance[0::2, 1::2] = covariance[1::2, 0::2] = 0.0
-        state[1::2], variances = jumps.speed(before, measurement) if len(ways) == 3 else (0.0, RATE_SIGMA_RAD_S**2)
+        state[1::2], variances = (
+            jumps.rates_between(before, measurement) if len(ways) == 3 else (0.0, RATE_SIGMA_RAD_S**2)
+        )
         covariance[1::2, 1::2] = np.eye(3) * variances
-        self._motion.start(state, covariance, (0.5, 0.5))
+        self._motion.initialise(state, covariance, (0.5, 0.5))
         self._rest.covariance = self._rest.covariance.copy()
         self._rest.covariance[0::2, 0::2] += ways.T @ ways * _JUMP_SIGMA_RAD**2
         self._evidence, self._moving = 0.0, False

@@ -1,4 +1,4 @@
-"""What the visual encoder tells of the shafts while the eyes rest."""
+"""The vergence that the visual encoder measures, relative to the shafts' estimate, while the eyes rest."""
 
 import math
 
@@ -11,7 +11,7 @@ Array = npt.NDArray[np.float64]
 
 _GATE = 3.0
 _COMMON_SHARE = 0.9
-"""Of an encoder's variance, what its readings of one rest have in common: the same features through the same lenses."""
+"""Share of a reading's variance common to all readings of one rest: the same features through the same lenses."""
 _MOUNT_TOLERANCE_RAD = 0.0175
 _WORST_SIGMA_RAD = 0.1
 
@@ -23,51 +23,51 @@ def farthest_offset_rad(rig: Rig) -> float:
 
 
 class VergenceOffset:
-    """How far the true vergence is from the shafts' estimated one, learnt from the visual encoder while the eyes rest.
+    """The true vergence minus the shafts' estimated one, from the visual encoder's readings while the eyes rest.
 
-    Every move of a pan makes it unknown again: the shaft then stops elsewhere in its play. A reading that the shafts'
-    model finds unlikely waits for a second one that agrees with it: servos are worse than their data sheets, but one
-    reading may be wrong. `refusal` says why the last reading was not believed, empty if it was.
+    Every move of a pan makes it unknown again: the shaft then stops elsewhere in its play. A reading that is unlikely
+    by the shafts' model waits for a second one that agrees with it: servos are worse than their data sheets, but one
+    reading may be wrong. `rejection` says why the last reading was rejected; it is empty if it was accepted.
     """
 
     def __init__(self, shaft_variances: Array, farthest_rad: float = math.inf) -> None:
         self._prior = float(shaft_variances[0] + shaft_variances[1])
         self._farthest_rad = farthest_rad
-        self.believed = 0
-        self.refused = 0
-        self.refusal = ""
-        self.moved(-math.inf)
+        self.accepted = 0
+        self.rejected = 0
+        self.rejection = ""
+        self.on_pan_moved(-math.inf)
 
-    def moved(self, stamp_s: float) -> None:
-        """A pan has moved, at `stamp_s`."""
+    def on_pan_moved(self, stamp_s: float) -> None:
+        """Reset the offset: a pan has moved at `stamp_s`."""
         self.offset_rad, self.variance = 0.0, self._prior
         self._rest_since_s = self._seen_s = stamp_s
         self._unlikely_rad = math.nan
 
     @property
     def known(self) -> bool:
-        """True once a reading of this rest was believed."""
+        """True once a reading of this rest was accepted."""
         return self._seen_s > self._rest_since_s
 
-    def see(self, stamp_s: float, difference_rad: float, sigma_rad: float) -> bool:
-        """Take a measured true vergence minus the shafts' at that stamp; False if it is not believed."""
-        self.refusal = self._take(stamp_s, difference_rad, sigma_rad)
-        if self.refusal:
-            self.refused += 1
+    def update(self, stamp_s: float, difference_rad: float, sigma_rad: float) -> bool:
+        """Update by a measured true vergence minus the shafts' at that stamp; returns False if it was rejected."""
+        self.rejection = self._rejection_of(stamp_s, difference_rad, sigma_rad)
+        if self.rejection:
+            self.rejected += 1
         else:
-            self.believed += 1
+            self.accepted += 1
             self._seen_s, self._unlikely_rad = stamp_s, math.nan
-        return not self.refusal
+        return not self.rejection
 
-    def _take(self, stamp_s: float, difference_rad: float, sigma_rad: float) -> str:
+    def _rejection_of(self, stamp_s: float, difference_rad: float, sigma_rad: float) -> str:
         if not (math.isfinite(difference_rad) and 0.0 < sigma_rad < _WORST_SIGMA_RAD):
-            return "it is not certain of anything"
+            return "the reading has no usable standard deviation"
         if not stamp_s > self._seen_s:
-            return "it is of before the eyes came to rest, or of before one already seen"
+            return "the reading predates the current fixation or one already used"
         if abs(difference_rad) > self._farthest_rad:
             return (
-                f"it contradicts the joints by {math.degrees(abs(difference_rad)):.2f} degrees: "
-                f"servos and mounts allow {math.degrees(self._farthest_rad):.2f}"
+                f"the reading contradicts the joints by {math.degrees(abs(difference_rad)):.2f} degrees: "
+                f"servo play and mounts explain at most {math.degrees(self._farthest_rad):.2f} degrees"
             )
         spread = self.variance + sigma_rad**2
         if (difference_rad - self.offset_rad) ** 2 <= _GATE**2 * spread:
@@ -77,6 +77,7 @@ class VergenceOffset:
             return ""
         before_rad, self._unlikely_rad = self._unlikely_rad, difference_rad
         if not abs(difference_rad - before_rad) <= _GATE * math.sqrt(2.0) * sigma_rad:
-            return f"it is {math.degrees(abs(difference_rad - self.offset_rad)):.2f} degrees off what was known: once"
+            off_deg = math.degrees(abs(difference_rad - self.offset_rad))
+            return f"the reading is {off_deg:.2f} degrees off the estimate and came only once: a second must confirm it"
         self.offset_rad, self.variance = difference_rad, sigma_rad**2
         return ""

@@ -1,1 +1,1 @@
-"""What is asked for: goals, how they begin, and when they have succeeded or failed."""
+"""Goals: what can be requested, how a request becomes a target, and how it ends."""

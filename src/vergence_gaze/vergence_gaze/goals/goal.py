@@ -1,4 +1,4 @@
-"""What the controller can be asked for, and how it can end."""
+"""Goals of the controller, and their outcomes."""
 
 import enum
 import math
@@ -64,7 +64,7 @@ class Outcome:
 
 
 class GoalError(ValueError):
-    """A goal that cannot be begun: INVALID or UNREACHABLE, and why."""
+    """A goal that cannot be started: INVALID or UNREACHABLE, and why."""
 
     def __init__(self, result: Result, reason: str) -> None:
         super().__init__(reason)

@@ -1,4 +1,4 @@
-"""The goal in hand: since when, what stands against it, and how it ends."""
+"""Tracks the active goal; decides success, failure or timeout."""
 
 import itertools
 import math
@@ -15,12 +15,15 @@ _DISAGREED_S = 1.0
 
 @dataclass(frozen=True)
 class Progress:
-    """What a goal's end depends on, at one cycle. `pose_reached` is None unless the goal is a pose."""
+    """The state that decides a goal, in one cycle. `pose_reached` is None unless the goal is a pose.
+
+    `verged_reason` says why the eyes are verged or not yet, `tracking_note` why the last measurement was rejected.
+    """
 
     now_s: float
     verged: bool
-    judged: str
-    note: str
+    verged_reason: str
+    tracking_note: str
     phase: Phase
     in_phase_s: float
     image_s: float
@@ -30,8 +33,8 @@ class Progress:
     pose_reached: bool | None
 
 
-class GoalWatch:
-    """Numbers goals, holds the one in hand, and collects outcomes until they are taken."""
+class GoalMonitor:
+    """Numbers goals, tracks the active one, and collects outcomes until they are popped."""
 
     def __init__(self) -> None:
         self._ids = itertools.count(1)
@@ -42,36 +45,36 @@ class GoalWatch:
 
     @property
     def goal_id(self) -> int | None:
-        """The goal in hand, None if there is none."""
+        """The active goal, None if there is none."""
         return self._goal_id
 
-    def number(self) -> int:
+    def new_id(self) -> int:
         """Return the id of a new goal."""
         return next(self._ids)
 
-    def refuse(self, goal_id: int, result: Result, reason: str) -> None:
-        """End a goal that was never begun."""
+    def reject(self, goal_id: int, result: Result, reason: str) -> None:
+        """Record the outcome of a goal that was never started."""
         self._outcomes.append(Outcome(goal_id, result, reason, 0.0))
 
-    def begin(self, goal_id: int, goal: Goal, now_s: float, parameters: GazeParameters) -> None:
-        """Take a goal in hand."""
+    def start(self, goal_id: int, goal: Goal, now_s: float, parameters: GazeParameters) -> None:
+        """Make a goal the active one."""
         self._goal_id, self._since_s = goal_id, now_s
-        self._limit_s = goal.time_limit_s or parameters.time_limit_s
+        self._limit_s = goal.time_limit_s or parameters.control.time_limit_s
         self._limited_since_s = self._disagreed_since_s = math.nan
 
     def end(self, result: Result, reason: str, now_s: float) -> None:
-        """End the goal in hand, if there is one."""
+        """End the active goal, if there is one."""
         if self._goal_id is not None:
             self._outcomes.append(Outcome(self._goal_id, result, reason, now_s - self._since_s))
             self._goal_id = None
 
-    def take_outcomes(self) -> tuple[Outcome, ...]:
-        """Return the outcomes since the last call."""
+    def pop_outcomes(self) -> tuple[Outcome, ...]:
+        """Return and remove the outcomes since the last call."""
         outcomes, self._outcomes = tuple(self._outcomes), []
         return outcomes
 
-    def watch(self, p: Progress, parameters: GazeParameters) -> Result | None:
-        """End the goal in hand if it is reached or can no longer be; returns how."""
+    def update(self, p: Progress, parameters: GazeParameters) -> Result | None:
+        """End the active goal if it is reached or can no longer be; returns the result, None while it goes on."""
         if self._goal_id is None:
             return None
         self._limited_since_s = _since(self._limited_since_s, p.beyond_limits, p.now_s)
@@ -84,23 +87,26 @@ class GoalWatch:
 
     def _pose_ending(self, p: Progress) -> tuple[Result, str] | None:
         if p.pose_reached:
-            return Result.VERGED, "the angles are reached"
+            return Result.VERGED, "the joints are at the requested angles"
         if p.now_s - self._since_s > self._limit_s:
-            return Result.TIMED_OUT, "the joints did not arrive"
+            return Result.TIMED_OUT, "the joints did not reach the requested angles in time"
         return None
 
     def _target_ending(self, p: Progress, parameters: GazeParameters) -> tuple[Result, str] | None:
         if p.verged:
-            return Result.VERGED, p.judged
+            return Result.VERGED, p.verged_reason
         if p.now_s - self._limited_since_s > _LIMITED_S:
             return Result.LIMITS, "the target is beyond the joints' limits"
         if p.now_s - self._disagreed_since_s > _DISAGREED_S:
-            return Result.DISAGREEMENT, "estimators disagree by more than the object's depth explains"
-        if p.now_s - max(p.image_s, self._since_s) > parameters.no_images_s:
-            return Result.NO_IMAGES, "no image results arrive"
+            return (
+                Result.DISAGREEMENT,
+                "estimators of the target's vergence disagree by more than the object's depth explains",
+            )
+        if p.now_s - max(p.image_s, self._since_s) > parameters.control.no_images_s:
+            return Result.NO_IMAGES, "no results from the images arrive"
         if p.now_s - self._since_s > self._limit_s:
             lost = p.phase in (Phase.LOST, Phase.SEARCH)
-            return (Result.LOST if lost else Result.TIMED_OUT), p.note or p.judged
+            return (Result.LOST if lost else Result.TIMED_OUT), p.tracking_note or p.verged_reason
         if p.phase is Phase.SEARCH and not p.by_class and p.in_phase_s > _LOST_S:
             return Result.LOST, "the target was not found again"
         return None

@@ -1,1 +1,1 @@
-"""Joint angles: their history, limits, resolution, and what a servo with play needs to be told."""
+"""Joint angles: their history, limits and resolution, and commands that compensate a servo's play."""

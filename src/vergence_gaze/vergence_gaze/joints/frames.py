@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vergence_gaze.joints.joint_history import JointHistory
+from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_rig.geometry import eye_position, rotation_rig_from_eye, rotation_rig_from_optical
 
 FRAMES = (
@@ -15,25 +15,25 @@ FRAMES = (
     "left_camera_optical_frame",
     "right_camera_optical_frame",
 )
-"""Frames that are known without tf2. An empty name is rig_base."""
+"""Frames that need no tf2. An empty name is rig_base."""
 
 
 class FrameError(ValueError):
-    """A frame that is not known here."""
+    """A frame that cannot be transformed to rig_base."""
 
 
 def point_in_rig(
-    point_m: Any, frame: str, stamp_s: float, history: JointHistory, baseline_m: float
+    point_m: Any, frame: str, stamp_s: float, history: ShaftHistory, baseline_m: float
 ) -> tuple[float, float, float]:
     """Return a point (3,) of `frame` at `stamp_s` (NaN: now) in rig_base [m]. Raises FrameError."""
     name = frame.rsplit("/", 1)[-1] or "rig_base"
     if name not in FRAMES:
-        raise FrameError(f"frame is {frame!r}: allowed is one of {', '.join(FRAMES)}; others need tf2_ros")
+        raise FrameError(f"the frame must be one of {', '.join(FRAMES)} where tf2_ros is not installed: got {frame!r}")
     if name == "rig_base":
         x, y, z = point_m
         return float(x), float(y), float(z)
     if not history.known:
-        raise FrameError(f"frame is {frame!r}: allowed is rig_base until joint_states arrive")
+        raise FrameError(f"the frame must be rig_base until joint_states arrive: got {frame!r}")
     known = math.isfinite(stamp_s) and history.covers(stamp_s)
     pan_left, pan_right, tilt = history.shaft_at(stamp_s) if known else history.shaft_rad
     left = name.startswith("left")

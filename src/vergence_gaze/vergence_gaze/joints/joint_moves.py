@@ -1,12 +1,12 @@
-"""What the joints' moves bring into what is known of their angles."""
+"""The uncertainty that the joints' moves add to the estimate of their angles."""
 
 from collections import deque
 
 import numpy as np
 import numpy.typing as npt
 
-from vergence_gaze.joints.joint_history import JointHistory
 from vergence_gaze.joints.resolution import pulse_steps_rad
+from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
@@ -17,12 +17,12 @@ _FIRST_SHARE = 0.6
 
 
 class JointMoves:
-    """Collects variances (3,) [rad^2] of moves with their stamps, until an image from after them comes.
+    """Collects variances (3,) [rad^2] of moves with their stamps, until an image exposed after them arrives.
 
     A joint that turns round crosses its play, and one that moves ends anywhere between two of its driver's steps.
     """
 
-    def __init__(self, rig: Rig, history: JointHistory) -> None:
+    def __init__(self, rig: Rig, history: ShaftHistory) -> None:
         self._history = history
         self._last_reported: Array | None = None
         self._last_direction = np.zeros(3)
@@ -30,8 +30,8 @@ class JointMoves:
         self.steps_rad = pulse_steps_rad(rig)
         """The joints' smallest steps (3,) [rad]."""
 
-    def note(self) -> bool:
-        """Take the newest report of the history; True if a pan has moved since the one before."""
+    def update(self) -> bool:
+        """Read the newest report of the history; returns True if a pan has moved since the one before."""
         reported = self._history.reported_rad
         if self._last_reported is None:
             self._last_reported = reported
@@ -53,13 +53,13 @@ class JointMoves:
         return bool(np.any(move[:2]))
 
     def variances_before(self, stamp_s: float) -> Array:
-        """Return the sum (3,) of the variances that `take_before` would take."""
+        """Return the sum (3,) of the variances that `pop_before` would return."""
         waiting = [variances for moved_s, variances in self._moves if moved_s <= stamp_s]
         return np.sum(waiting, axis=0) if waiting else np.zeros(3)
 
-    def take_before(self, stamp_s: float) -> list[Array]:
-        """Return, once, the variances of moves before an exposure: an earlier image knows nothing of them."""
-        taken = []
+    def pop_before(self, stamp_s: float) -> list[Array]:
+        """Return and remove the variances (3,) of moves before an exposure: earlier images do not show those moves."""
+        popped = []
         while self._moves and self._moves[0][0] <= stamp_s:
-            taken.append(self._moves.popleft()[1])
-        return taken
+            popped.append(self._moves.popleft()[1])
+        return popped

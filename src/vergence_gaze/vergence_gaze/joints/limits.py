@@ -1,4 +1,4 @@
-"""Safety as a pure function: from the wanted joint angles and the last command to what is really sent."""
+"""Safety as a pure function: from the desired joint angles and the last command to the command that is sent."""
 
 import math
 
@@ -10,7 +10,7 @@ from vergence_rig.rig import Rig
 Array = npt.NDArray[np.float64]
 
 LONGEST_STEP_S = 0.1
-"""A controller that slept longer than this may not make up for it in one command."""
+"""After a longer pause of the controller, one command moves the joints no farther than for this time."""
 
 _MARGIN_RAD = 1e-9
 
@@ -36,7 +36,7 @@ class CommandLimits:
         return allowed
 
     def allows(self, angles_rad: Array, tolerance_rad: float = 1e-12) -> bool:
-        """Tell whether the joint and vergence limits hold."""
+        """Return whether the joint and vergence limits hold."""
         return bool(
             np.isfinite(angles_rad).all()
             and (angles_rad >= self.lower_rad - tolerance_rad).all()
@@ -44,11 +44,11 @@ class CommandLimits:
             and angles_rad[1] - angles_rad[0] >= self.minimum_vergence_rad - tolerance_rad
         )
 
-    def sent(self, wanted_rad: Array, last_rad: Array | None, elapsed_s: float, present_rad: Array) -> Array:
-        """Return the command (3,) that is sent.
+    def limited(self, desired_rad: Array, last_rad: Array | None, elapsed_s: float, present_rad: Array) -> Array:
+        """Return the command (3,) to send.
 
         Args:
-            wanted_rad: what the law wants (3,); joints that are not finite stay where they are.
+            desired_rad: desired angles (3,); joints that are not finite stay where they are.
             last_rad: the last command sent, or None before the first, which is the nearest allowed to `present_rad`.
             elapsed_s: time since the last command; nothing moves if it is not a positive number.
             present_rad: where the joints are reported (3,), finite.
@@ -57,13 +57,13 @@ class CommandLimits:
             return self.nearest(present_rad)
         if not (math.isfinite(elapsed_s) and elapsed_s > 0):
             return last_rad
-        wanted = self.nearest(np.where(np.isfinite(wanted_rad), wanted_rad, last_rad))
+        desired = self.nearest(np.where(np.isfinite(desired_rad), desired_rad, last_rad))
         reach = self.speed_rad_s * min(elapsed_s, LONGEST_STEP_S)
-        move = np.clip(wanted - last_rad, -reach, reach)
+        move = np.clip(desired - last_rad, -reach, reach)
         # The pans may arrive one after the other; a common fraction of the move keeps to the vergence limit on the way.
         room = last_rad[1] - last_rad[0] - self.minimum_vergence_rad
         closing = move[0] - move[1]
         if closing > room:
             move[:2] *= max(room, 0.0) / closing
-        sent: Array = np.clip(last_rad + move, self.lower_rad, self.upper_rad)
-        return sent
+        limited: Array = np.clip(last_rad + move, self.lower_rad, self.upper_rad)
+        return limited

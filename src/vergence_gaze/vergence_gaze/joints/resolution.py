@@ -1,4 +1,4 @@
-"""The smallest steps of the joints, as their driver really has them, in the rig's description."""
+"""The smallest steps of the joints: the driver's own, put into the rig's description."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ def pulse_steps_rad(rig: Rig) -> Array:
 
 
 def rig_with_steps(rig: Rig, steps_rad: Mapping[str, float]) -> Rig:
-    """Return the rig with these steps [rad] by joint; joints not named, and steps that no servo has, keep theirs."""
+    """Return the rig with these steps [rad] by joint; joints not named, and invalid steps, keep the described ones."""
     joints = dict(rig.joints.items())
     for name in JOINT_NAMES:
         step_rad = steps_rad.get(name, math.nan)

@@ -1,14 +1,15 @@
 """What to command so that the shaft ends where it should: the inverse of dead band and backlash.
 
 A hobby servo stops half its dead band short, on the side it came from, and its gears add half their play. Moving on in
-the same direction is exact, turning round first crosses the play. So the inverse overdrives by the half play in the
-direction of motion, and is slow to turn round: a joint that turned at every noisy residual would never rest.
+the same direction is exact, reversing first crosses the play. So the inverse overdrives by the half play in the
+direction of motion, and is slow to reverse: a joint that reversed at every noisy residual would never rest.
 """
 
 import numpy as np
 import numpy.typing as npt
 
 from vergence_gaze.joints.resolution import pulse_steps_rad
+from vergence_gaze.parameters import ServoParameters
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
@@ -19,37 +20,35 @@ _STEP_SHARE = 0.6
 
 
 class ServoInverse:
-    """Overdrives each joint (3,) past its play, and leaves alone what its smallest step cannot mend.
+    """Overdrives each joint (3,) past its play, and leaves errors alone that its smallest step cannot correct."""
 
-    `trust` is the share of the play crossed at once when turning round.
-    """
-
-    def __init__(self, rig: Rig, tolerance_rad: float, trust: float) -> None:
+    def __init__(self, rig: Rig, parameters: ServoParameters) -> None:
+        tolerance_rad = parameters.hold_tolerance_rad
         servos = [joint.servo for _, joint in rig.joints.items()]
         self._half_play = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
         # The next step would be no nearer.
         unresolved = _STEP_SHARE * pulse_steps_rad(rig)
         self._tolerance = np.maximum(tolerance_rad + _MOVE_SHARE * self._half_play, unresolved)
         self._turn_tolerance = np.maximum(tolerance_rad + 2.0 * _TURN_SHARE * self._half_play, unresolved)
-        self._trust = trust
+        self._compensation = parameters.play_compensation
         self._direction = np.zeros(3)
 
     def reset(self) -> None:
-        """Forget which way each joint came: after somebody else moved them."""
+        """Forget each joint's last direction: the joints were moved by something else."""
         self._direction = np.zeros(3)
 
-    def command(self, wanted_rad: Array, shaft_rad: Array, commanded_rad: Array) -> Array:
-        """Return the command (3,) that brings the shafts to `wanted_rad` (3,).
+    def command(self, desired_rad: Array, shaft_rad: Array, commanded_rad: Array) -> Array:
+        """Return the command (3,) that brings the shafts to `desired_rad` (3,).
 
         Args:
-            wanted_rad: where each shaft should be; one that is not finite leaves its joint alone.
+            desired_rad: where each shaft should be; one that is not finite leaves its joint alone.
             shaft_rad: where each shaft is estimated to be now.
             commanded_rad: the last command sent.
         """
         command = commanded_rad.copy()
         arriving = np.clip(shaft_rad, commanded_rad - self._half_play, commanded_rad + self._half_play)
         for i in range(3):
-            error = wanted_rad[i] - arriving[i]
+            error = desired_rad[i] - arriving[i]
             if not np.isfinite(error):
                 continue
             direction = 1.0 if error > 0 else -1.0
@@ -58,6 +57,6 @@ class ServoInverse:
                 continue
             self._direction[i] = direction
             # A long way is overdriven in full; a short way back in part: an overestimated play must not overshoot.
-            share = self._trust if turning and abs(error) < 4.0 * self._half_play[i] else 1.0
-            command[i] = wanted_rad[i] + direction * self._half_play[i] * share
+            share = self._compensation if turning and abs(error) < 4.0 * self._half_play[i] else 1.0
+            command[i] = desired_rad[i] + direction * self._half_play[i] * share
         return command

@@ -1,1 +1,1 @@
-"""The ROS rim: nodes and message conversion."""
+"""The node gaze_controller_node, its action server and its message conversion."""

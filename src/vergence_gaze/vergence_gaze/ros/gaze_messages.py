@@ -14,8 +14,8 @@ from vergence_common.stamps import to_seconds, to_stamp
 from vergence_gaze.control.report import GazeReport
 from vergence_gaze.estimation.observations import (
     BoxSighting,
-    EdgeJudgement,
-    EyeRotationReading,
+    EdgeContrast,
+    EyeRotationObservation,
     FoveaDisparity,
     JointReport,
     JointResolution,
@@ -31,7 +31,7 @@ from vergence_rig.rig import JOINT_NAMES
 Array = npt.NDArray[np.float64]
 
 BASE_FRAME = "rig_base"
-JUDGE_WINDOWS_PX = (50, 150)
+SMALL_WINDOWS_PX = (50, 150)
 _RAY_M = 2.0
 
 
@@ -105,20 +105,20 @@ def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
     )
 
 
-def edge_judgement(message: EdgeVergence) -> EdgeJudgement:
-    """Return the best contrast of the small windows, which judge best, and the raw metric of the same window."""
+def edge_contrast(message: EdgeVergence) -> EdgeContrast:
+    """Return the least contrast of the small windows, which show vergence best, and the raw metric of that window."""
     best = (math.nan, math.nan)
     for size, contrast, left, right in zip(
         message.windows_px, message.contrast, message.left_to_right_px, message.right_to_left_px, strict=False
     ):
-        if JUDGE_WINDOWS_PX[0] <= size <= JUDGE_WINDOWS_PX[1] and not contrast >= best[0]:
+        if SMALL_WINDOWS_PX[0] <= size <= SMALL_WINDOWS_PX[1] and not contrast >= best[0]:
             best = (contrast, 0.5 * (left + right)) if math.isfinite(contrast) else best
-    return EdgeJudgement(to_seconds(message.header.stamp), best[0], best[1], message.verged)
+    return EdgeContrast(to_seconds(message.header.stamp), *best)
 
 
-def eye_rotation(message: EyeRotation) -> EyeRotationReading:
-    """Return what the visual encoder read."""
-    return EyeRotationReading(
+def eye_rotation(message: EyeRotation) -> EyeRotationObservation:
+    """Return the visual encoder's reading."""
+    return EyeRotationObservation(
         stamp_s=to_seconds(message.header.stamp),
         skew_s=message.pair_skew_s,
         vergence_rad=message.vergence_rad,

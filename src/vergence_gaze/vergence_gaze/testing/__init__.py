@@ -1,1 +1,1 @@
-"""Test doubles."""
+"""Test doubles: a head without hardware for tests and benchmarks."""

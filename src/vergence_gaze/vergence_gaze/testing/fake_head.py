@@ -1,7 +1,7 @@
 """A head without hardware, pixels or physics: servo plants, a point as target, and sightings with noise and latency.
 
-It ships beside the controller as its fake: tests and benchmarks run against it, faster than real time. What it sees
-comes from its own true shafts, by the definition of the axes; only the servo plant is shared with the rest.
+Tests and benchmarks run the controller against it, faster than real time. What it sees comes from its own true
+shafts, by the definition of the axes; only the servo plant is shared with the rest.
 """
 
 import heapq
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from vergence_gaze.estimation.observations import (
     BoxSighting,
-    EdgeJudgement,
+    EdgeContrast,
     FoveaDisparity,
     JointReport,
     Observation,
@@ -32,8 +32,8 @@ TICK_S = 1.0 / 300.0
 
 
 @dataclass(frozen=True)
-class Seeing:
-    """How the head sees. Latency is from exposure to the result's arrival; noise and offsets are of the image."""
+class VisionModel:
+    """Images and estimators. Latency is from exposure to the result's arrival; noise and offsets are of the image."""
 
     latency_s: float = 0.06
     frame_ticks: int = 10
@@ -57,15 +57,15 @@ class Seeing:
 class FakeHead:
     """Rig, true servos, target and eyes. `visible(t)` hides the target; `target(t)` gives it (3,) in rig_base [m].
 
-    `clutter(t)` is a point that lies at the fovea while the target is hidden (an occluder), or None. `mistaken` says,
-    by estimator ("fovea", "track", "box"), what it takes for the target at `t`, or None while it is right. `servos` are
-    the servos as they really are, by joint, where they differ from what the rig's description says. Time begins at
+    `clutter(t)` is a point that lies at the fovea while the target is hidden (an occluder), or None. `mistaken` gives,
+    by estimator ("fovea", "track", "box"), the point that it measures instead of the target at `t`, or None while it is
+    right. `servos` are the real servos by joint, where they differ from the rig's description. Time starts at
     `begin_s`.
     """
 
     rig: Rig
     target: Callable[[float], Array]
-    seeing: Seeing = field(default_factory=Seeing)
+    vision: VisionModel = field(default_factory=VisionModel)
     seed: int = 0
     start_rad: Mapping[str, float] = field(default_factory=dict)
     visible: Callable[[float], bool] = lambda time_s: True
@@ -137,10 +137,10 @@ class FakeHead:
             for name in JOINT_NAMES:
                 self.reported_rad[name] = self._models[name].modelled_rad
             self._send(now_s + 0.002, JointReport(now_s, dict(self.reported_rad)))
-        phase = self._ticks % self.seeing.frame_ticks
+        phase = self._ticks % self.vision.frame_ticks
         if phase == 0:
             self._pending_frame = (now_s, self._project(left=True), self.visible(now_s))
-        if phase == self.seeing.skew_ticks and self._pending_frame is not None:
+        if phase == self.vision.skew_ticks and self._pending_frame is not None:
             self._see_pair(*self._pending_frame, now_s)
             self._pending_frame = None
         arrived = []
@@ -171,18 +171,18 @@ class FakeHead:
             self._lately.clear()
 
     def _see_pair(self, left_s: float, left_xy: Array, visible: bool, right_s: float) -> None:
-        seeing, focal = self.seeing, self.rig.left_camera.fx_px
+        vision, focal = self.vision, self.rig.left_camera.fx_px
         right_xy = self._misaligned(self._project(left=False))
-        noise = self._random.normal(0.0, seeing.noise_px / focal, 4)
+        noise = self._random.normal(0.0, vision.noise_px / focal, 4)
         in_left = visible and self._in_view(left_xy)
         in_right = visible and self._in_view(right_xy)
         left_xy, right_xy = left_xy + noise[:2], right_xy + noise[2:]
-        arrival_s = right_s + seeing.latency_s
-        left_s, right_s = left_s + seeing.stamp_error_s, right_s + seeing.stamp_error_s
+        arrival_s = right_s + vision.latency_s
+        left_s, right_s = left_s + vision.stamp_error_s, right_s + vision.stamp_error_s
         disparity = math.atan(left_xy[0]) - math.atan(right_xy[0]) if in_left and in_right else math.nan
-        sigma = 1.5 * seeing.noise_px / focal
+        sigma = 1.5 * vision.noise_px / focal
         skew_s = right_s - left_s
-        if seeing.track:
+        if vision.track:
             locked = left_s > self._lock_s
             usable = in_left and locked
             self._send(
@@ -196,13 +196,13 @@ class FakeHead:
                     float(left_xy[1]),
                     disparity + self._mistake_rad("track", left_s, disparity),
                     sigma,
-                    seeing.extent_rad,
+                    vision.extent_rad,
                     usable,
                 ),
             )
         on_fovea = in_left and math.hypot(*left_xy) < 0.05
         at_fovea = disparity + self._mistake_rad("fovea", left_s, disparity)
-        if seeing.fovea:
+        if vision.fovea:
             value = at_fovea if on_fovea else math.nan
             if not visible and self.clutter is not None:
                 left, right = self.project(self.clutter(left_s), True), self.project(self.clutter(left_s), False)
@@ -211,12 +211,12 @@ class FakeHead:
             self._send(arrival_s, FoveaDisparity(left_s, skew_s, value, sigma, 0.9 if usable else 0.0, usable))
         pixels = abs(at_fovea) * focal if on_fovea and in_right else math.inf
         contrast = 0.3 + 0.68 * (1.0 - math.exp(-((pixels / 3.6) ** 1.2))) + self._random.normal(0.0, 0.03)
-        self._send(arrival_s, EdgeJudgement(left_s, contrast, min(pixels, 8.0) + 1.0, False))
-        if seeing.boxes and self._ticks % seeing.box_frame_ticks < seeing.frame_ticks:
+        self._send(arrival_s, EdgeContrast(left_s, contrast, min(pixels, 8.0) + 1.0))
+        if vision.boxes and self._ticks % vision.box_frame_ticks < vision.frame_ticks:
             self._see_boxes(left_s, skew_s, left_xy if in_left else None, right_xy if in_right else None)
 
     def _mistake_rad(self, estimator: str, time_s: float, disparity_rad: float) -> float:
-        """Return how far an estimator's disparity is off because it is of something else; 0 if it is not."""
+        """Return how far an estimator's disparity is off because it measures another object; 0 if it does not."""
         other = self.mistaken[estimator](time_s) if estimator in self.mistaken else None
         if other is None or not math.isfinite(disparity_rad):
             return 0.0
@@ -224,20 +224,20 @@ class FakeHead:
         return math.atan(left[0]) - math.atan(right[0]) - disparity_rad
 
     def _see_boxes(self, left_s: float, skew_s: float, left_xy: Array | None, right_xy: Array | None) -> None:
-        seeing, focal = self.seeing, self.rig.left_camera.fx_px
+        vision, focal = self.vision, self.rig.left_camera.fx_px
         elsewhere = self.mistaken["box"](left_s) if "box" in self.mistaken else None
         if elsewhere is not None:
             left_xy, right_xy = self.project(elsewhere, left=True), self.project(elsewhere, left=False)
-        if self._random.random() < seeing.box_miss_share:
+        if self._random.random() < vision.box_miss_share:
             left_xy = right_xy = None
         angles = np.full(4, math.nan)
         for i, xy in enumerate((left_xy, right_xy)):
             if xy is not None:
-                blurred = xy + self._random.normal(0.0, seeing.box_noise_px / focal, 2)
+                blurred = xy + self._random.normal(0.0, vision.box_noise_px / focal, 2)
                 angles[2 * i : 2 * i + 2] = np.arctan(blurred)
         usable = left_xy is not None or right_xy is not None
         self._send(
-            left_s + skew_s - seeing.stamp_error_s + seeing.box_latency_s,
+            left_s + skew_s - vision.stamp_error_s + vision.box_latency_s,
             BoxSighting(
                 stamp_s=left_s,
                 skew_s=skew_s,
@@ -246,21 +246,21 @@ class FakeHead:
                 right_azimuth_rad=float(angles[2]),
                 right_elevation_rad=float(angles[3]),
                 surface_disparity_rad=math.nan,
-                sigma_rad=seeing.box_noise_px / focal,
-                extent_rad=seeing.extent_rad,
+                sigma_rad=vision.box_noise_px / focal,
+                extent_rad=vision.extent_rad,
                 class_name="target" if usable else "",
                 usable=usable,
             ),
         )
 
     def _misaligned(self, xy: Array) -> Array:
-        sine, cosine = math.sin(self.seeing.right_roll_rad), math.cos(self.seeing.right_roll_rad)
-        offset = self.seeing.right_vertical_px / self.rig.right_camera.fy_px
+        sine, cosine = math.sin(self.vision.right_roll_rad), math.cos(self.vision.right_roll_rad)
+        offset = self.vision.right_vertical_px / self.rig.right_camera.fy_px
         return np.array([cosine * xy[0] - sine * xy[1], sine * xy[0] + cosine * xy[1] - offset])
 
     def _in_view(self, xy: Array) -> bool:
         camera = self.rig.left_camera
-        margin = self.seeing.field_margin_px
+        margin = self.vision.field_margin_px
         return bool(
             abs(xy[0]) * camera.fx_px < 0.5 * camera.width_px - margin
             and abs(xy[1]) * camera.fy_px < 0.5 * camera.height_px - margin

@@ -9,9 +9,9 @@ from vergence_gaze.estimation.locks import BoxLock, TrackLock
 from vergence_gaze.estimation.observations import TrackSighting
 from vergence_gaze.estimation.target_filter import TargetEstimate
 from vergence_gaze.estimation.tracking import TargetTracking
-from vergence_gaze.joints.joint_history import JointHistory
 from vergence_gaze.joints.joint_moves import JointMoves
-from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.joints.shaft_history import ShaftHistory
+from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_rig.rig import default_rig
 
 DEG = math.pi / 180.0
@@ -35,37 +35,37 @@ def test_the_first_track_keeps_the_click() -> None:
 
 def test_an_offset_is_learnt_from_boxes_of_the_same_pair_alone() -> None:
     lock = adopted(PLACE)
-    lock.take(1.0, 1, moved(0.8, 0.0))
-    lock.hold_against(1.1, PLACE)
+    lock.add(1.0, 1, moved(0.8, 0.0))
+    lock.correct_offset(1.1, PLACE)
     np.testing.assert_allclose(lock.offset, 0.0, atol=1e-12)
     for k in range(12):
-        lock.take(2.0 + 0.1 * k, 1, moved(0.8, -0.2))
-        lock.hold_against(2.0 + 0.1 * k, PLACE)
+        lock.add(2.0 + 0.1 * k, 1, moved(0.8, -0.2))
+        lock.correct_offset(2.0 + 0.1 * k, PLACE)
     np.testing.assert_allclose(lock.offset, np.array([-0.8, 0.2]) * DEG, atol=0.02 * DEG)
 
 
-def test_a_new_track_takes_the_first_box_at_its_word() -> None:
+def test_the_first_box_sets_the_offset_of_a_new_track() -> None:
     lock = adopted(PLACE)
     assert lock.adopt(2, moved(0.5, 0.0), ESTIMATE, 0.07, 0.02) == ""
     np.testing.assert_allclose(lock.offset, 0.0)
-    lock.take(1.0, 2, moved(0.5, 0.0))
-    lock.hold_against(1.0, PLACE)
+    lock.add(1.0, 2, moved(0.5, 0.0))
+    lock.correct_offset(1.0, PLACE)
     np.testing.assert_allclose(lock.offset, np.array([-0.5, 0.0]) * DEG, atol=1e-12)
 
 
-def test_a_refused_track_teaches_nothing_any_more() -> None:
+def test_a_rejected_track_gives_no_place_any_more() -> None:
     lock = adopted(PLACE)
-    lock.take(1.0, 1, PLACE)
+    lock.add(1.0, 1, PLACE)
     assert lock.place_at(1.0) is not None
-    lock.refuse()
+    lock.reject()
     assert lock.place_at(1.0) is None
     assert "not the target" in lock.adopt(1, PLACE, ESTIMATE, 0.07, 0.02)
 
 
-def test_boxes_that_one_eye_alone_saw_teach_nothing() -> None:
+def test_boxes_that_one_eye_alone_saw_correct_nothing() -> None:
     lock = adopted(PLACE)
-    lock.take(1.0, 1, moved(0.5, 0.0))
-    lock.hold_against(1.0, np.array([math.nan, *PLACE[1:]]))
+    lock.add(1.0, 1, moved(0.5, 0.0))
+    lock.correct_offset(1.0, np.array([math.nan, *PLACE[1:]]))
     np.testing.assert_allclose(lock.offset, 0.0, atol=1e-12)
 
 
@@ -75,7 +75,7 @@ def followed(lock: TrackLock) -> int | None:
 
 def test_a_class_takes_the_track_that_its_boxes_are_around_in_one_pair() -> None:
     lock = TrackLock()
-    lock.take(1.0, 7, moved(0.3, -0.2))
+    lock.add(1.0, 7, moved(0.3, -0.2))
     lock.adopt_by_class(1.1, ESTIMATE, PLACE, 0.1, 0.01)
     assert followed(lock) is None, "another pair"
     lock.adopt_by_class(1.0, ESTIMATE, PLACE, 0.1, 0.01)
@@ -90,12 +90,12 @@ def test_a_class_takes_the_track_that_its_boxes_are_around_in_one_pair() -> None
     [moved(4.0, 0.0), moved(0.0, 4.0), PLACE + np.array([0.0, 1.0, 0.0]) * DEG],
     ids=["beside", "below", "deeper"],
 )
-def test_a_class_leaves_a_track_of_another_thing_and_lets_go_of_one_that_strays(seen_rad: np.ndarray) -> None:
+def test_a_class_leaves_a_track_of_another_thing_and_releases_one_that_strays(seen_rad: np.ndarray) -> None:
     lock = TrackLock()
-    lock.take(1.0, 7, seen_rad)
+    lock.add(1.0, 7, seen_rad)
     lock.adopt_by_class(1.0, ESTIMATE, PLACE, 0.1, 0.01)
     assert followed(lock) is None
-    lock.take(2.0, 7, PLACE)
+    lock.add(2.0, 7, PLACE)
     lock.adopt_by_class(2.0, ESTIMATE, PLACE, 0.1, 0.01)
     assert followed(lock) == 7
     for stamp_s, seen, kept in (
@@ -104,32 +104,30 @@ def test_a_class_leaves_a_track_of_another_thing_and_lets_go_of_one_that_strays(
         (5.0, seen_rad, True),
         (6.0, seen_rad, False),
     ):
-        lock.take(stamp_s, 7, seen)
-        assert lock.hold_against_class(stamp_s, PLACE, 0.1, 0.01) is kept
-    lock.refuse()
-    lock.take(7.0, 7, PLACE)
+        lock.add(stamp_s, 7, seen)
+        assert lock.correct_offset_by_class(stamp_s, PLACE, 0.1, 0.01) is kept
+    lock.reject()
+    lock.add(7.0, 7, PLACE)
     lock.adopt_by_class(7.0, ESTIMATE, PLACE, 0.1, 0.01)
     assert followed(lock) is None
 
 
 @pytest.mark.parametrize(("left_rad", "extent_rad"), [(math.nan, 0.1), (PLACE[0], math.nan)])
-def test_boxes_that_do_not_tell_where_or_how_wide_neither_give_nor_take_a_track(
-    left_rad: float, extent_rad: float
-) -> None:
+def test_boxes_without_place_or_width_neither_give_nor_take_a_track(left_rad: float, extent_rad: float) -> None:
     lock, vague = TrackLock(), np.array([left_rad, *PLACE[1:]])
-    lock.take(1.0, 7, moved(9.0, 0.0))
+    lock.add(1.0, 7, moved(9.0, 0.0))
     lock.adopt_by_class(1.0, ESTIMATE, vague, extent_rad, 0.01)
     assert followed(lock) is None
-    lock.take(2.0, 7, PLACE)
+    lock.add(2.0, 7, PLACE)
     lock.adopt_by_class(2.0, ESTIMATE, PLACE, 0.1, 0.01)
     for stamp_s in (3.0, 4.0, 5.0):
-        lock.take(stamp_s, 7, moved(9.0, 0.0))
-        assert lock.hold_against_class(stamp_s, vague, extent_rad, 0.01)
+        lock.add(stamp_s, 7, moved(9.0, 0.0))
+        assert lock.correct_offset_by_class(stamp_s, vague, extent_rad, 0.01)
 
 
 def test_a_track_seen_by_one_eye_is_taken_by_its_direction() -> None:
     lock = TrackLock()
-    lock.take(1.0, 7, np.array([PLACE[0], math.nan, PLACE[2]]))
+    lock.add(1.0, 7, np.array([PLACE[0], math.nan, PLACE[2]]))
     lock.adopt_by_class(1.0, ESTIMATE, PLACE, 0.1, 0.01)
     assert followed(lock) == 7
 
@@ -138,31 +136,31 @@ def test_boxes_learn_from_the_track_at_first_and_then_stand() -> None:
     lock = BoxLock()
     for _ in range(5):
         assert lock.adopt(moved(0.4, 0.1), 0.1, math.inf, ESTIMATE)
-        lock.hold_against(moved(0.4, 0.1), PLACE[[0, 2]])
+        lock.correct_offset(moved(0.4, 0.1), PLACE[[0, 2]])
     np.testing.assert_allclose(lock.offset, np.array([-0.4, -0.1]) * DEG, atol=1e-12)
     for _ in range(10):
         assert lock.adopt(moved(1.4, 0.1), 0.1, math.inf, ESTIMATE)
-        lock.hold_against(moved(1.4, 0.1), PLACE[[0, 2]])
+        lock.correct_offset(moved(1.4, 0.1), PLACE[[0, 2]])
     assert abs(lock.offset[0] + 0.4 * DEG) < 0.11 * DEG
 
 
-def test_boxes_do_not_learn_from_what_they_told_themselves() -> None:
+def test_boxes_do_not_learn_from_boxes_alone() -> None:
     lock = BoxLock()
     for k in range(5):
         assert lock.adopt(moved(0.4 * k, 0.0), 0.1, math.inf, ESTIMATE)
-        lock.hold_against(moved(0.4 * k, 0.0), None)
+        lock.correct_offset(moved(0.4 * k, 0.0), None)
     np.testing.assert_allclose(lock.offset, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("depth", "aside_deg", "taken"), [(True, 3.0, True), (False, 3.0, False), (False, 1.0, True)])
 def test_a_track_of_unknown_depth_is_the_target_only_near_it(depth: bool, aside_deg: float, taken: bool) -> None:
-    rig, parameters = default_rig(), GazeParameters()
-    history = JointHistory(rig)
+    rig, parameters = default_rig(), gaze_parameters()
+    history = ShaftHistory(rig)
     for stamp_s in (0.9, 1.0, 1.1):
         history.add(stamp_s, {"pan_left": PLACE[0], "pan_right": PLACE[1], "tilt": 0.0})
     tracking = TargetTracking(rig, parameters, history, JointMoves(rig, history))
-    tracking.want(1.0, 1.0, np.array([4.0, 6.0, 0.0]) * DEG, np.eye(3) * 1e-6)
+    tracking.request_target(1.0, 1.0, np.array([4.0, 6.0, 0.0]) * DEG, np.eye(3) * 1e-6)
     x, disparity = -math.tan(aside_deg * DEG), 0.0 if depth else math.nan
     sighting = TrackSighting(1.05, 0.0, 1, 1.0, x, 0.0, disparity, 0.001, 0.1, True)
-    assert tracking.see_track(sighting, 1.1) is taken
+    assert tracking.update_track(sighting, 1.1) is taken
     assert taken or "deg away" in tracking.note

@@ -1,4 +1,4 @@
-"""From a goal to the target that is wanted: angles to begin with, how sure they are, whether they can be had."""
+"""From a goal to the requested target: its first angles, their covariance, and whether they are reachable."""
 
 import math
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from vergence_gaze.estimation.directions import SightingError, direction_angles, spread_of_eye
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result
-from vergence_gaze.joints.joint_history import JointHistory
+from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_gaze.parameters import GazeParameters
 from vergence_rig.geometry import (
     GeometryError,
@@ -28,7 +28,7 @@ _PRESENT_VERGENCE_BOUNDS_RAD = (0.03, 0.14)
 
 
 @dataclass(frozen=True)
-class WantedTarget:
+class RequestedTarget:
     """Version, vergence, tilt (3,) that fixate the target and their covariance (3, 3), as seen at `stamp_s`."""
 
     stamp_s: float
@@ -37,31 +37,31 @@ class WantedTarget:
 
 
 @dataclass(frozen=True)
-class WantedPose:
+class RequestedPose:
     """Joint angles (3,) [rad] to go to, without a target."""
 
     joints_rad: Array
 
 
 @dataclass(frozen=True)
-class WantedClass:
+class RequestedClass:
     """A detected class to find and verge on."""
 
     class_name: str
 
 
-def start_of(
-    goal: Goal, rig: Rig, parameters: GazeParameters, history: JointHistory, now_s: float
-) -> WantedTarget | WantedPose | WantedClass:
-    """Return what a goal asks for; raises GoalError (INVALID or UNREACHABLE)."""
+def resolve_goal(
+    goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, now_s: float
+) -> RequestedTarget | RequestedPose | RequestedClass:
+    """Return what a goal requests; raises GoalError (INVALID or UNREACHABLE)."""
     if not (math.isfinite(goal.time_limit_s) and goal.time_limit_s >= 0):
-        raise GoalError(Result.INVALID, f"time_limit_s is {goal.time_limit_s!r}: allowed is 0 (default) or more [s]")
+        raise GoalError(Result.INVALID, f"time_limit_s must be 0 (default) or more [s]: got {goal.time_limit_s!r}")
     if goal.kind is GoalKind.CLASS:
         if not goal.class_name:
-            raise GoalError(Result.INVALID, "class_name is empty: allowed is a class that the detector knows")
-        return WantedClass(goal.class_name)
+            raise GoalError(Result.INVALID, "class_name must be one of the detector's classes: got an empty text")
+        return RequestedClass(goal.class_name)
     if not history.known:
-        raise GoalError(Result.INVALID, "no joint_states have arrived: the eyes' angles are not known")
+        raise GoalError(Result.INVALID, "joint_states must have arrived before a goal: none has")
     if goal.kind in (GoalKind.ANGLES, GoalKind.RELATIVE_ANGLES):
         return _pose(goal, rig, parameters, history)
     stamp_s = goal.stamp_s if math.isfinite(goal.stamp_s) and history.covers(goal.stamp_s) else now_s
@@ -79,10 +79,10 @@ def start_of(
     return target
 
 
-def _pose(goal: Goal, rig: Rig, parameters: GazeParameters, history: JointHistory) -> WantedPose:
+def _pose(goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory) -> RequestedPose:
     angles = (goal.version_rad, goal.vergence_rad, goal.tilt_rad)
     if not all(math.isfinite(angle) for angle in angles):
-        raise GoalError(Result.INVALID, f"version, vergence, tilt are {angles}: allowed are finite angles [rad]")
+        raise GoalError(Result.INVALID, f"version, vergence, tilt must be finite angles [rad]: got {angles}")
     present = history.reported_rad
     eyes = from_version_vergence(*angles)
     joints = np.array([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad])
@@ -91,19 +91,19 @@ def _pose(goal: Goal, rig: Rig, parameters: GazeParameters, history: JointHistor
     if joints[1] - joints[0] < rig.minimum_vergence_rad - 1e-6:
         raise GoalError(
             Result.UNREACHABLE,
-            f"vergence is {joints[1] - joints[0]:.4f} rad: allowed is at least {rig.minimum_vergence_rad:g}",
+            f"the vergence must be at least {rig.minimum_vergence_rad:g} rad: got {joints[1] - joints[0]:.4f}",
         )
     _check_reach(dict(zip(("pan_left", "pan_right", "tilt"), joints.tolist(), strict=True)), rig, parameters)
-    return WantedPose(joints)
+    return RequestedPose(joints)
 
 
-def _point(goal: Goal, rig: Rig, parameters: GazeParameters, history: JointHistory, stamp_s: float) -> WantedTarget:
+def _point(goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, stamp_s: float) -> RequestedTarget:
     eyes = gaze_for_point(goal.point_m, rig.baseline_m)
     angles = np.array([eyes.version_rad, eyes.vergence_rad, eyes.tilt_rad])
-    return WantedTarget(stamp_s, angles, np.eye(3) * _POINT_SIGMA_RAD**2)
+    return RequestedTarget(stamp_s, angles, np.eye(3) * _POINT_SIGMA_RAD**2)
 
 
-def _pixel(goal: Goal, rig: Rig, parameters: GazeParameters, history: JointHistory, stamp_s: float) -> WantedTarget:
+def _pixel(goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, stamp_s: float) -> RequestedTarget:
     joints = history.shaft_at(stamp_s)
     x, y = goal.left_xy if goal.left_eye else goal.right_xy
     eye_pan = joints[0] if goal.left_eye else joints[1]
@@ -113,42 +113,43 @@ def _pixel(goal: Goal, rig: Rig, parameters: GazeParameters, history: JointHisto
         place = eye_position(goal.left_eye, rig.baseline_m) + goal.depth_m * ray / np.linalg.norm(ray)
         eyes = gaze_for_point(place, rig.baseline_m)
         angles = np.array([eyes.version_rad, eyes.vergence_rad, eyes.tilt_rad])
-        # A depth that somebody typed is good to a tenth or so.
+        # A stated depth is good to a tenth or so.
         sigma = 0.1 * max(abs(eyes.vergence_rad), 0.04)
-        return WantedTarget(stamp_s, angles, spread_of_eye(goal.left_eye, _CLICK_SIGMA_RAD, sigma))
+        return RequestedTarget(stamp_s, angles, spread_of_eye(goal.left_eye, _CLICK_SIGMA_RAD, sigma))
     # Without depth the eyes keep their present vergence: all of it where they already look, elsewhere as far as it
     # leaves both directions open.
-    at_fovea = math.hypot(pan - eye_pan, tilt - joints[2]) <= parameters.saccade_threshold_rad
+    at_fovea = math.hypot(pan - eye_pan, tilt - joints[2]) <= parameters.saccade.threshold_rad
     lowest, highest = _PRESENT_VERGENCE_BOUNDS_RAD
     vergence = float(np.clip(joints[1] - joints[0], lowest, math.inf if at_fovea else highest))
     version = pan + 0.5 * vergence if goal.left_eye else pan - 0.5 * vergence
-    spread = spread_of_eye(goal.left_eye, _CLICK_SIGMA_RAD, parameters.prior_vergence_sigma_rad)
-    return WantedTarget(stamp_s, np.array([version, vergence, tilt]), spread)
+    spread = spread_of_eye(goal.left_eye, _CLICK_SIGMA_RAD, parameters.target.prior_vergence_sigma_rad)
+    return RequestedTarget(stamp_s, np.array([version, vergence, tilt]), spread)
 
 
 def _stereo_pixel(
-    goal: Goal, rig: Rig, parameters: GazeParameters, history: JointHistory, stamp_s: float
-) -> WantedTarget:
+    goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, stamp_s: float
+) -> RequestedTarget:
     joints = history.shaft_at(stamp_s)
     left_pan, tilt = direction_angles(joints[0], joints[2], *goal.left_xy)
     right_pan, _ = direction_angles(joints[1], joints[2], goal.right_xy[0], goal.left_xy[1])
     angles = np.array([0.5 * (left_pan + right_pan), right_pan - left_pan, tilt])
     if angles[1] < rig.minimum_vergence_rad - _REACH_TOLERANCE_RAD:
         raise GoalError(
-            Result.UNREACHABLE, f"the pixels diverge by {-math.degrees(angles[1]):.1f} deg: no point is there"
+            Result.UNREACHABLE,
+            f"the rays of the two pixels must meet: they diverge by {-math.degrees(angles[1]):.1f} deg",
         )
-    return WantedTarget(stamp_s, angles, np.eye(3) * (2.0 * _CLICK_SIGMA_RAD) ** 2)
+    return RequestedTarget(stamp_s, angles, np.eye(3) * (2.0 * _CLICK_SIGMA_RAD) ** 2)
 
 
 def _check_reach(joints_rad: dict[str, float], rig: Rig, parameters: GazeParameters) -> None:
-    held = {"left_held": "pan_left", "right_held": "pan_right"}.get(parameters.mode)
+    held = {"left_held": "pan_left", "right_held": "pan_right"}.get(parameters.control.mode)
     for name, joint in rig.joints.items():
-        if name == held or (name == "tilt" and not parameters.tilt_enabled):
+        if name == held or (name == "tilt" and not parameters.control.tilt_enabled):
             continue
         angle = joints_rad[name]
         if not joint.lower_rad - _REACH_TOLERANCE_RAD <= angle <= joint.upper_rad + _REACH_TOLERANCE_RAD:
             raise GoalError(
                 Result.UNREACHABLE,
-                f"{name} would be {math.degrees(angle):.1f} deg: allowed is "
-                f"{math.degrees(joint.lower_rad):.1f} to {math.degrees(joint.upper_rad):.1f}",
+                f"{name} must be {math.degrees(joint.lower_rad):.1f} to {math.degrees(joint.upper_rad):.1f} deg: "
+                f"the goal needs {math.degrees(angle):.1f}",
             )

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_gaze.estimation.imm_filter import Motion
+from vergence_gaze.estimation.imm_filter import ImmFilter
 from vergence_gaze.estimation.kalman import Measurement
 from vergence_gaze.estimation.target_filter import TargetFilter
 
@@ -21,7 +21,7 @@ Place = Callable[[float], tuple[float, float, float]]
 
 def filter_at(start: tuple[float, float, float], manoeuvre_rad_s2: float = 8.0) -> TargetFilter:
     target = TargetFilter(1.0, manoeuvre_rad_s2, 0.002, 4.5, 2)
-    target.start(0.0, np.array(start), np.eye(3) * 1e-4)
+    target.initialise(0.0, np.array(start), np.eye(3) * 1e-4)
     return target
 
 
@@ -37,7 +37,7 @@ def followed(place: Place, until_s: float, manoeuvre_rad_s2: float = 8.0, ahead_
         time_s = i * INTERVAL_S
         measurement = seen(place(time_s), time_s, random.normal(0.0, SIGMA, 3))
         if not target.update(measurement):
-            target.jump(measurement)
+            target.accept_jump(measurement)
         if time_s > 1.0:
             errors.append(target.at(time_s + ahead_s).version_rad - place(time_s + ahead_s)[0])
     return np.array(errors)
@@ -71,10 +71,10 @@ def test_one_outlier_is_refused_and_two_that_agree_are_a_jump() -> None:
         assert target.update(seen((0.0, 0.08, 0.0), i * INTERVAL_S, np.zeros(3)))
     first, second = (seen((0.3, 0.05, 0.1), i * INTERVAL_S, np.zeros(3)) for i in (20, 21))
     assert not target.update(first)
-    assert not target.jump(first)
+    assert not target.accept_jump(first)
     assert target.at(first.stamp_s).version_rad == pytest.approx(0.0, abs=1e-4)
     assert not target.update(second)
-    assert target.jump(second)
+    assert target.accept_jump(second)
     np.testing.assert_allclose(target.at(second.stamp_s).angles_rad, (0.3, 0.05, 0.1), atol=1e-3)
 
 
@@ -85,7 +85,7 @@ def test_a_jump_onto_something_that_moves_takes_its_speed() -> None:
         place = (0.0, 0.08, 0.0) if i < 20 else (0.3 + 1.0 * (time_s - 20 * INTERVAL_S), 0.08, 0.0)
         measurement = seen(place, time_s, np.zeros(3))
         if not target.update(measurement):
-            target.jump(measurement)
+            target.accept_jump(measurement)
         if i == 24:
             assert target.at(time_s).rates_rad_s[0] == pytest.approx(1.0, abs=0.15)
 
@@ -100,7 +100,7 @@ def jumped(steps: tuple[tuple[float, float], ...], sigma: float = SIGMA) -> Targ
         place = np.array([version, 0.08, 0.0])
         measurement = Measurement(ROWS, ROWS @ place, np.full(3, sigma), np.full(3, time_s))
         if not target.update(measurement):
-            target.jump(measurement)
+            target.accept_jump(measurement)
     return target
 
 
@@ -116,7 +116,7 @@ def test_two_sightings_that_go_on_are_of_a_target_on_its_way() -> None:
         (((0.05, 0.1), (0.05, 0.2)), SIGMA),  # it has jumped
         (((0.05, 0.1), (0.053, 0.2)), SIGMA),  # the same, with noise
         (((0.3, 0.1), (0.32, 0.2)), 0.02),  # as far apart as that sighting's noise
-        (((0.05, 0.1), (0.058, 0.104)), SIGMA),  # two words on one pair
+        (((0.05, 0.1), (0.058, 0.104)), SIGMA),  # two measurements of one pair
     ],
 )
 def test_two_sightings_of_one_place_are_of_a_target_at_rest(
@@ -134,12 +134,12 @@ def test_a_depth_alone_that_goes_on_is_no_motion() -> None:
     for i, vergence in ((6, 0.12), (7, 0.13)):
         measurement = Measurement(DEPTH, np.array([vergence]), np.array([SIGMA]), np.array([i * INTERVAL_S]))
         assert not target.update(measurement)
-    assert target.jump(measurement)
+    assert target.accept_jump(measurement)
     assert not target.moving
 
 
 @pytest.mark.parametrize("rate_hz", [20.0, 30.0])
-def test_a_start_at_full_speed_is_told_within_four_pairs(rate_hz: float) -> None:
+def test_a_start_at_full_speed_is_detected_within_four_pairs(rate_hz: float) -> None:
     random = np.random.default_rng(8)
     target, begun_s = filter_at((0.0, 0.08, 0.0)), 2.0
     for i in range(1, int(3.0 * rate_hz)):
@@ -147,7 +147,7 @@ def test_a_start_at_full_speed_is_told_within_four_pairs(rate_hz: float) -> None
         gone_s = max(time_s - begun_s, 0.0)
         measurement = seen((math.radians(20.0) * gone_s, 0.08, 0.0), time_s, random.normal(0.0, SIGMA, 3))
         if not target.update(measurement):
-            target.jump(measurement)
+            target.accept_jump(measurement)
         assert not (target.moving and gone_s == 0.0)
         if gone_s >= 4.0 / rate_hz:
             assert target.moving
@@ -161,14 +161,14 @@ def test_a_depth_alone_moves_the_right_eye_only() -> None:
     for i in (6, 7):
         measurement = Measurement(DEPTH, np.array([0.12]), np.array([SIGMA]), np.array([i * INTERVAL_S]))
         assert not target.update(measurement)
-    assert target.jump(measurement)
+    assert target.accept_jump(measurement)
     assert target.at(0.24).vergence_rad == pytest.approx(0.12, abs=1e-3)
     assert target.at(0.24).joints_rad[0] == pytest.approx(left_before, abs=1e-3)
 
 
 def test_joint_sigmas_are_of_the_joints() -> None:
     target = filter_at((0.1, 0.08, 0.0))
-    target.loosen(np.array([4e-4, 0.0, 0.0]))
+    target.inflate_covariance(np.array([4e-4, 0.0, 0.0]))
     left, right, tilt = target.at(0.0).joint_sigmas_rad
     assert left == pytest.approx(math.sqrt(1.25e-4 + 4e-4), rel=1e-6)
     assert right == pytest.approx(math.sqrt(1.25e-4), rel=1e-6)
@@ -176,14 +176,14 @@ def test_joint_sigmas_are_of_the_joints() -> None:
 
 
 def test_weights_follow_what_is_seen() -> None:
-    calm_then_wild = Motion(1.0, 8.0)
+    calm_then_wild = ImmFilter(1.0, 8.0)
     state = np.zeros(6)
-    calm_then_wild.start(state, np.eye(6) * 1e-4)
+    calm_then_wild.initialise(state, np.eye(6) * 1e-4)
 
     def see(version_rad: float, time_s: float) -> float:
-        calm_then_wild.advance(INTERVAL_S)
+        calm_then_wild.predict(INTERVAL_S)
         measurement = seen((version_rad, 0.0, 0.0), time_s, np.zeros(3))
-        calm_then_wild.correct(calm_then_wild.fits(measurement, time_s))
+        calm_then_wild.update(calm_then_wild.innovations(measurement, time_s))
         assert calm_then_wild.weights.sum() == pytest.approx(1.0)
         return float(calm_then_wild.weights[1])
 
@@ -217,7 +217,7 @@ def test_whatever_is_seen_the_estimate_stays_finite_and_its_covariance_positive(
         else:
             measurement = Measurement(DEPTH, np.array([vergence]), np.array([SIGMA]), np.array([time_s]))
         if not target.update(measurement):
-            target.jump(measurement)
+            target.accept_jump(measurement)
         estimate = target.at(time_s + 0.1)
         assert np.isfinite(estimate.angles_rad).all()
         assert np.linalg.eigvalsh(estimate.covariance).min() > 0

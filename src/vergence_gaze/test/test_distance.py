@@ -22,8 +22,8 @@ def estimate(distance_m: float, sigma_rad: float = 1e-4) -> TargetEstimate:
 
 
 def test_half_a_degree_is_13_cm_at_one_metre() -> None:
-    doubt = np.array([0.5, 0.5, 0.0]) * math.radians(0.5) ** 2  # together half a degree of vergence
-    position = target_position(estimate(1.0), RIG, doubt)
+    variances = np.array([0.5, 0.5, 0.0]) * math.radians(0.5) ** 2  # together half a degree of vergence
+    position = target_position(estimate(1.0), RIG, variances)
     assert position.distance_m == pytest.approx(1.0, abs=1e-6)
     assert math.sqrt(position.covariance_m2[0, 0]) == pytest.approx(0.134, abs=0.002)
 
@@ -53,11 +53,11 @@ def test_the_visual_encoder_narrows_the_interval_until_a_pan_moves() -> None:
     offset = VergenceOffset(variances)
     before = target_position(estimate(1.0), RIG, variances, offset)
     for i in range(20):
-        assert offset.see(1.0 + i, 0.002, 0.0004)
+        assert offset.update(1.0 + i, 0.002, 0.0004)
     after = target_position(estimate(1.0), RIG, variances, offset)
     assert offset.offset_rad == pytest.approx(0.002, rel=0.15)
     assert after.high_m - after.low_m < 0.6 * (before.high_m - before.low_m)
     assert after.distance_m < before.distance_m  # converging more than the joints say is nearer
-    offset.moved(100.0)
-    assert not offset.see(99.0, 0.002, 0.0004)
+    offset.on_pan_moved(100.0)
+    assert not offset.update(99.0, 0.002, 0.0004)
     assert target_position(estimate(1.0), RIG, variances, offset).distance_m == pytest.approx(before.distance_m)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vergence_gaze.estimation.depth_monitor import DepthWatch
-from vergence_gaze.estimation.distractor_gate import Rivals
+from vergence_gaze.estimation.depth_monitor import DepthMonitor
+from vergence_gaze.estimation.distractor_gate import DistractorGate
 from vergence_gaze.estimation.target_filter import TargetEstimate
 
 PATIENCE_S = 1.0
@@ -22,23 +22,23 @@ def joints(version_rad: float, vergence_rad: float) -> np.ndarray:
     return np.array([version_rad - 0.5 * vergence_rad, version_rad + 0.5 * vergence_rad, 0.0])
 
 
-def first_believed_s(rivals: Rivals, place: np.ndarray, target: TargetEstimate, fovea_rad: float | None) -> float:
+def first_accepted_s(gate: DistractorGate, place: np.ndarray, target: TargetEstimate, fovea_rad: float | None) -> float:
     """Return after how long a target that is only seen at `place`, at 30 Hz, is taken for the jumped one."""
     for i in range(60):
         stamp_s = 10.0 + i / 30.0
         if fovea_rad is not None:
-            rivals.see_fovea(stamp_s, fovea_rad, target.joints_rad)
-        if rivals.may_be_the_target(stamp_s, place, EXTENT_RAD, OWN_DEPTH_RAD, target):
+            gate.update_fovea(stamp_s, fovea_rad, target.joints_rad)
+        if gate.accepts(stamp_s, place, EXTENT_RAD, OWN_DEPTH_RAD, target):
             return stamp_s - 10.0
     return np.inf
 
 
-def rivals_that_saw_it_here(target: TargetEstimate) -> Rivals:
-    rivals = Rivals(PATIENCE_S)
+def gate_that_saw_it_here(target: TargetEstimate) -> DistractorGate:
+    gate = DistractorGate(PATIENCE_S)
     for i in range(10):
-        rivals.see_fovea(9.5 + 0.05 * i, target.vergence_rad, target.joints_rad)
-        rivals.found(9.5 + 0.05 * i, target)
-    return rivals
+        gate.update_fovea(9.5 + 0.05 * i, target.vergence_rad, target.joints_rad)
+        gate.on_target(9.5 + 0.05 * i, target)
+    return gate
 
 
 @pytest.mark.parametrize(
@@ -58,45 +58,45 @@ def test_how_long_it_has_to_be_seen_elsewhere(
     place: np.ndarray, moving: bool, fovea_rad: float | None, from_s: float, to_s: float
 ) -> None:
     target = estimate(moving=moving)
-    took_s = first_believed_s(rivals_that_saw_it_here(target), place, target, fovea_rad)
+    took_s = first_accepted_s(gate_that_saw_it_here(target), place, target, fovea_rad)
     assert from_s <= took_s <= to_s
 
 
 def test_what_was_seen_beside_the_target_is_not_the_target() -> None:
     target, aside = estimate(), joints(0.3, NEAR)
-    rivals = rivals_that_saw_it_here(target)
-    assert not rivals.may_be_the_target(9.96, aside, EXTENT_RAD, OWN_DEPTH_RAD, target)
-    rivals.found(9.98, target)  # and the target after it
-    assert first_believed_s(rivals, aside, target, None) > 0.95
+    gate = gate_that_saw_it_here(target)
+    assert not gate.accepts(9.96, aside, EXTENT_RAD, OWN_DEPTH_RAD, target)
+    gate.on_target(9.98, target)  # and the target after it
+    assert first_accepted_s(gate, aside, target, None) > 0.95
 
 
-def test_a_jump_leaves_no_grudge() -> None:
+def test_after_a_jump_the_old_place_is_no_distractor() -> None:
     target, aside = estimate(), joints(0.3, HERE)
-    rivals = rivals_that_saw_it_here(target)
-    assert rivals.may_be_the_target(9.97, aside, EXTENT_RAD, OWN_DEPTH_RAD, target)
-    rivals.found(9.97, estimate(version_rad=0.3))  # believed: it is there now
-    assert first_believed_s(rivals, joints(0.0, HERE), estimate(version_rad=0.3), None) == 0.0
+    gate = gate_that_saw_it_here(target)
+    assert gate.accepts(9.97, aside, EXTENT_RAD, OWN_DEPTH_RAD, target)
+    gate.on_target(9.97, estimate(version_rad=0.3))  # accepted: it is there now
+    assert first_accepted_s(gate, joints(0.0, HERE), estimate(version_rad=0.3), None) == 0.0
 
 
 def test_a_track_does_not_jump_in_depth() -> None:
-    watch, target = DepthWatch(), estimate(moving=True)
-    told = [(0.0, HERE), (0.1, NEAR), (0.6, NEAR), (0.7, HERE), (0.8, NEAR), (1.7, NEAR)]
-    sudden = [watch.is_sudden(stamp_s, vergence_rad, OWN_DEPTH_RAD, target) for stamp_s, vergence_rad in told]
+    monitor, target = DepthMonitor(), estimate(moving=True)
+    measured = [(0.0, HERE), (0.1, NEAR), (0.6, NEAR), (0.7, HERE), (0.8, NEAR), (1.7, NEAR)]
+    sudden = [monitor.is_depth_jump(stamp_s, vergence_rad, OWN_DEPTH_RAD, target) for stamp_s, vergence_rad in measured]
     assert sudden == [False, True, True, False, True, False]
 
 
-def test_a_track_is_doubted_while_its_depth_is_off() -> None:
-    watch, doubts = DepthWatch(), []
+def test_a_track_is_inconsistent_while_its_depth_is_off() -> None:
+    monitor, inconsistent = DepthMonitor(), []
     for i, vergence_rad in enumerate((HERE, NEAR, NEAR, HERE)):
-        watch.is_sudden(0.1 * i, vergence_rad, OWN_DEPTH_RAD, estimate())
-        doubts.append(watch.doubts_the_track)
-    assert doubts == [False, True, True, False]
+        monitor.is_depth_jump(0.1 * i, vergence_rad, OWN_DEPTH_RAD, estimate())
+        inconsistent.append(monitor.track_inconsistent)
+    assert inconsistent == [False, True, True, False]
 
 
 @pytest.mark.parametrize(("fovea_rad", "sudden"), [(NEAR, False), (HERE, True)])
 def test_of_a_track_at_rest_the_fovea_confirms_the_new_depth(fovea_rad: float, sudden: bool) -> None:
-    watch, target = DepthWatch(), estimate()
+    monitor, target = DepthMonitor(), estimate()
     for i in range(5):
-        watch.see_fovea(i / 30.0, fovea_rad)
-        is_sudden = watch.is_sudden(i / 30.0, NEAR, OWN_DEPTH_RAD, target)
+        monitor.update_fovea(i / 30.0, fovea_rad)
+        is_sudden = monitor.is_depth_jump(i / 30.0, NEAR, OWN_DEPTH_RAD, target)
     assert is_sudden is sudden

@@ -20,19 +20,19 @@ def limits() -> CommandLimits:
 
 def test_the_first_command_is_where_the_joints_are(limits: CommandLimits) -> None:
     present = np.array([-0.1, 0.1, 0.2])
-    np.testing.assert_allclose(limits.sent(ZERO, None, math.nan, present), present)
+    np.testing.assert_allclose(limits.limited(ZERO, None, math.nan, present), present)
     outside = np.array([-2.0, 2.0, 2.0])
-    np.testing.assert_allclose(limits.sent(ZERO, None, math.nan, outside), limits.nearest(outside))
+    np.testing.assert_allclose(limits.limited(ZERO, None, math.nan, outside), limits.nearest(outside))
 
 
 def test_speed_limit(limits: CommandLimits) -> None:
-    sent = limits.sent(np.array([1.0, 1.0, 0.5]), np.array([0.0, 0.01, 0.0]), 0.01, ZERO)
+    sent = limits.limited(np.array([1.0, 1.0, 0.5]), np.array([0.0, 0.01, 0.0]), 0.01, ZERO)
     speeds = [joint.speed_rad_s * 0.01 for _, joint in RIG.joints.items()]
     np.testing.assert_allclose(sent, np.array([0.0, 0.01, 0.0]) + speeds)
 
 
 def test_a_long_sleep_is_not_made_up_for(limits: CommandLimits) -> None:
-    sent = limits.sent(np.array([0.0, 0.1, 0.7]), np.array([0.0, 0.1, -0.7]), 1000.0, ZERO)
+    sent = limits.limited(np.array([0.0, 0.1, 0.7]), np.array([0.0, 0.1, -0.7]), 1000.0, ZERO)
     assert sent[2] == pytest.approx(-0.7 + RIG.tilt.speed_rad_s * LONGEST_STEP_S)
 
 
@@ -45,20 +45,20 @@ def test_eyes_that_would_diverge_look_at_infinity_between_both(limits: CommandLi
 def test_vergence_limit_on_the_way(limits: CommandLimits) -> None:
     last = np.array([0.0, 0.02, 0.0])
     for wanted in ([0.5, 0.5, 0.0], [0.5, 0.03, 0.0], [0.02, -0.5, 0.0]):
-        assert limits.allows(limits.sent(np.array(wanted), last, 0.05, last))
+        assert limits.allows(limits.limited(np.array(wanted), last, 0.05, last))
 
 
 def test_joints_that_are_not_numbers_stay(limits: CommandLimits) -> None:
     last = np.array([-0.1, 0.1, 0.2])
-    np.testing.assert_array_equal(limits.sent(np.full(3, math.nan), last, 0.01, last), last)
-    sent = limits.sent(np.array([math.inf, 0.15, -math.inf]), last, 0.01, last)
+    np.testing.assert_array_equal(limits.limited(np.full(3, math.nan), last, 0.01, last), last)
+    sent = limits.limited(np.array([math.inf, 0.15, -math.inf]), last, 0.01, last)
     np.testing.assert_allclose(sent, [-0.1, 0.15, 0.2])
 
 
 @pytest.mark.parametrize("elapsed_s", [0.0, -1.0, math.nan, math.inf, -math.inf])
 def test_time_that_does_not_pass_moves_nothing(limits: CommandLimits, elapsed_s: float) -> None:
     last = np.array([-0.1, 0.1, 0.2])
-    np.testing.assert_array_equal(limits.sent(np.array([0.0, 0.2, 0.0]), last, elapsed_s, last), last)
+    np.testing.assert_array_equal(limits.limited(np.array([0.0, 0.2, 0.0]), last, elapsed_s, last), last)
 
 
 @pytest.mark.parametrize("minimum_rad", [0.0, 0.05])
@@ -74,9 +74,9 @@ def test_a_hundred_thousand_hostile_commands(minimum_rad: float) -> None:
     wanted[(odd >= 0.08) & (odd < 0.11)] = -math.inf
     wanted[(odd >= 0.11) & (odd < 0.13)] *= 1e300
     elapsed = random.choice([0.001, 0.01, 0.05, 1.0, 0.0, -0.5, math.nan, math.inf], count)
-    last = limits.sent(ZERO, None, math.nan, np.array([0.4, -0.4, 2.0]))
+    last = limits.limited(ZERO, None, math.nan, np.array([0.4, -0.4, 2.0]))
     for i in range(count):
-        sent = limits.sent(wanted[i], last, elapsed[i], ZERO)
+        sent = limits.limited(wanted[i], last, elapsed[i], ZERO)
         passed_s = min(elapsed[i], LONGEST_STEP_S) if math.isfinite(elapsed[i]) and elapsed[i] > 0 else 0.0
         assert limits.allows(sent), (i, wanted[i], last, sent)
         assert (np.abs(sent - last) <= limits.speed_rad_s * passed_s + 1e-12).all(), (i, wanted[i], last, sent)

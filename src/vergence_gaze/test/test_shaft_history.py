@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from vergence_gaze.joints.joint_history import JointHistory
+from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
 from vergence_rig.servo import IDEAL, SG90, ServoPlant, ServoSpec
 
@@ -21,9 +21,9 @@ def positions(angle_rad: float) -> dict[str, float]:
     return dict.fromkeys(JOINT_NAMES, angle_rad)
 
 
-def worst_rad(servo: ServoSpec, commands_told: bool, report_phase_s: float = 0.0) -> float:
+def worst_rad(servo: ServoSpec, commands_known: bool, report_phase_s: float = 0.0) -> float:
     """Return how far the history is off between reports while a servo goes along with 60 degrees/s in 50 Hz steps."""
-    plant, history, worst = ServoPlant(servo, 0.0), JointHistory(rig_with(servo)), 0.0
+    plant, history, worst = ServoPlant(servo, 0.0), ShaftHistory(rig_with(servo)), 0.0
     samples: list[tuple[float, float]] = []
     for tick in range(1, 600):
         now_s = tick * 0.001
@@ -33,8 +33,8 @@ def worst_rad(servo: ServoSpec, commands_told: bool, report_phase_s: float = 0.0
             history.add(now_s, positions(plant.modelled_rad))
         if tick % 20 == 0:
             plant.command(math.radians(60.0) * now_s, now_s)
-            if commands_told:
-                history.commanded(now_s)
+            if commands_known:
+                history.on_command(now_s)
     for time_s, true_rad in samples:
         if 0.1 < time_s < 0.5:
             worst = max(worst, abs(float(history.shaft_at(time_s)[0]) - true_rad))
@@ -43,17 +43,17 @@ def worst_rad(servo: ServoSpec, commands_told: bool, report_phase_s: float = 0.0
 
 @pytest.mark.parametrize("servo", [IDEAL, NO_PLAY], ids=["ideal", "late"])
 @pytest.mark.parametrize("report_phase_s", [0.0, 0.007, 0.013])
-def test_commands_tell_when_the_eyes_turned(servo: ServoSpec, report_phase_s: float) -> None:
-    told, untold = (worst_rad(servo, commands_told, report_phase_s) for commands_told in (True, False))
-    assert told < math.radians(0.62)  # half a step, while the samples themselves are one millisecond apart
-    assert untold > math.radians(0.5)
-    assert told <= untold
+def test_commands_give_when_the_eyes_turned(servo: ServoSpec, report_phase_s: float) -> None:
+    known, unknown = (worst_rad(servo, commands_known, report_phase_s) for commands_known in (True, False))
+    assert known < math.radians(0.62)  # half a step, while the samples themselves are one millisecond apart
+    assert unknown > math.radians(0.5)
+    assert known <= unknown
 
 
 def test_a_servo_whose_command_fell_on_a_report_turns_right_after_it() -> None:
-    history = JointHistory(rig_with(IDEAL))
+    history = ShaftHistory(rig_with(IDEAL))
     history.add(1.0, positions(0.0))
-    history.commanded(1.0)
+    history.on_command(1.0)
     history.add(1.02, positions(0.05))
     speed = IDEAL.speed_rad_s
     assert history.reported_at(1.0 + 0.02 / speed)[0] == pytest.approx(0.02)
@@ -62,16 +62,16 @@ def test_a_servo_whose_command_fell_on_a_report_turns_right_after_it() -> None:
 
 
 def test_a_command_takes_effect_after_the_latency() -> None:
-    history = JointHistory(rig_with(NO_PLAY))
+    history = ShaftHistory(rig_with(NO_PLAY))
     history.add(1.0, positions(0.0))
-    history.commanded(1.0)
+    history.on_command(1.0)
     history.add(1.02, positions(0.05))
     assert history.reported_at(1.014)[0] == pytest.approx(0.0)
     assert history.reported_at(1.0149 + 0.05 / NO_PLAY.speed_rad_s)[0] == pytest.approx(0.05, abs=2e-3)
 
 
 def test_without_a_command_the_way_is_even() -> None:
-    history = JointHistory(rig_with(IDEAL))
+    history = ShaftHistory(rig_with(IDEAL))
     history.add(1.0, positions(0.0))
     history.add(1.02, positions(0.05))
     np.testing.assert_allclose(history.reported_at(1.005), 0.0125)
@@ -81,7 +81,7 @@ def test_without_a_command_the_way_is_even() -> None:
 
 def test_the_shaft_follows_its_play_late_between_reports_too() -> None:
     servo = NO_PLAY.replaced(dead_band_rad=0.02)
-    history = JointHistory(rig_with(servo))
+    history = ShaftHistory(rig_with(servo))
     history.add(1.0, positions(0.0))
     history.add(1.02, positions(0.04))
     np.testing.assert_allclose(history.shaft_at(1.005), 0.0)
@@ -90,7 +90,7 @@ def test_the_shaft_follows_its_play_late_between_reports_too() -> None:
 
 
 def test_slip_is_the_speed_beside_the_targets() -> None:
-    history = JointHistory(rig_with(IDEAL))
+    history = ShaftHistory(rig_with(IDEAL))
     for i in range(4):
         history.add(1.0 + i * PERIOD_S, positions(0.02 * i))
     assert history.speed_within(1.0, 1.06) == pytest.approx(1.0)
@@ -99,10 +99,10 @@ def test_slip_is_the_speed_beside_the_targets() -> None:
 
 
 def test_a_clock_that_was_set_forgets_the_commands_too() -> None:
-    history = JointHistory(rig_with(IDEAL))
+    history = ShaftHistory(rig_with(IDEAL))
     history.add(10.0, positions(0.0))
-    history.commanded(10.0)
+    history.on_command(10.0)
     assert history.add(1.0, positions(0.0))
-    history.commanded(1.0)
+    history.on_command(1.0)
     history.add(1.02, positions(0.05))
     assert history.reported_at(1.015)[0] == pytest.approx(0.05)

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from vergence_gaze.estimation.consistency_monitor import Agreement
+from vergence_gaze.estimation.consistency_monitor import ConsistencyMonitor
 from vergence_gaze.estimation.exposures import Exposures, positive_sigma
 from vergence_gaze.estimation.target_filter import TargetEstimate
-from vergence_gaze.joints.joint_history import JointHistory
-from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.joints.shaft_history import ShaftHistory
+from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_rig.rig import JOINT_NAMES, default_rig
 
 PAIR_S = 1.0 / 30.0
@@ -17,10 +17,10 @@ PAIR_S = 1.0 / 30.0
 
 def turning(speed_rad_s: float) -> Exposures:
     """Eyes that turn at this speed, reported at 50 Hz from 0 to 1 s."""
-    history = JointHistory(default_rig())
+    history = ShaftHistory(default_rig())
     for i in range(51):
         history.add(0.02 * i, dict.fromkeys(JOINT_NAMES, speed_rad_s * 0.02 * i))
-    return Exposures(GazeParameters(), history)
+    return Exposures(gaze_parameters(), history)
 
 
 def target(rate_rad_s: float, moving: bool = True) -> TargetEstimate:
@@ -59,28 +59,28 @@ def test_a_stated_sigma_is_held_to_what_is_sensible() -> None:
     assert [positive_sigma(value, 0.01) for value in (math.nan, -1.0, 0.0, 0.02, 9.0)] == [0.01, 0.01, 0.01, 0.02, 0.5]
 
 
-def differing(agreement: Agreement, pairs: int, from_s: float = 0.0) -> float:
+def differing(monitor: ConsistencyMonitor, pairs: int, from_s: float = 0.0) -> float:
     for i in range(pairs):
         stamp_s = from_s + i * PAIR_S
-        agreement.see_track(stamp_s, 0.08, 0.0)
-        agreement.see_fovea(stamp_s, 0.14)
+        monitor.update_track(stamp_s, 0.08, 0.0)
+        monitor.update_fovea(stamp_s, 0.14)
     return from_s + pairs * PAIR_S
 
 
 @pytest.mark.parametrize(("moving", "lasts_s"), [(False, 10 * PAIR_S), (True, 24 * PAIR_S)])
 def test_of_a_moving_target_estimators_may_differ_for_longer(moving: bool, lasts_s: float) -> None:
-    agreement, pairs = Agreement(0.02), 0
-    while not agreement.disagreement(moving):
-        differing(agreement, 1, pairs * PAIR_S)
+    monitor, pairs = ConsistencyMonitor(0.02), 0
+    while not monitor.disagreement(moving):
+        differing(monitor, 1, pairs * PAIR_S)
         pairs += 1
     assert pairs * PAIR_S == pytest.approx(lasts_s)
 
 
 def test_a_disagreement_ends_once_the_fovea_is_silent() -> None:
-    agreement = Agreement(0.02)
-    begin_s = differing(agreement, 40)
-    assert agreement.disagreement(moving=True)
+    monitor = ConsistencyMonitor(0.02)
+    begin_s = differing(monitor, 40)
+    assert monitor.disagreement(moving=True)
     for i in range(12):
-        agreement.see_track(begin_s + i * PAIR_S, 0.08, 0.0)
-    assert not agreement.disagreement(moving=False)
-    assert not agreement.doubtful
+        monitor.update_track(begin_s + i * PAIR_S, 0.08, 0.0)
+    assert not monitor.disagreement(moving=False)
+    assert not monitor.differing

@@ -1,8 +1,9 @@
-"""Boxes beside the other estimators: what they add to a click, when they win, and when they are not heeded."""
+"""Boxes beside the other estimators: what they add to a click, when they win, and when they are ignored."""
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,12 @@ import pytest
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import JointResolution, Observation, PointSighting
 from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, Result
-from vergence_gaze.parameters import GazeParameters
-from vergence_gaze.testing.fake_head import FakeHead, Seeing
+from vergence_gaze.parameter_groups import gaze_parameters
+from vergence_gaze.testing.fake_head import FakeHead, VisionModel
 from vergence_rig.rig import default_rig
 from vergence_rig.servo import IDEAL, SG90, ServoSpec
 
-DETECTOR = Seeing(boxes=True, track=False, box_frame_ticks=30, box_latency_s=0.14, box_noise_px=1.5)
+DETECTOR = VisionModel(boxes=True, track=False, box_frame_ticks=30, box_latency_s=0.14, box_noise_px=1.5)
 PLACE = np.array([0.8, 0.1, 0.02])
 BEHIND = 1.5 * PLACE
 
@@ -26,17 +27,17 @@ class Run:
 
     def __init__(
         self,
-        seeing: Seeing,
+        vision: VisionModel,
         mistaken: Mapping[str, Callable[[float], Any]],
         servo: ServoSpec = IDEAL,
         real: ServoSpec | None = None,
-        **parameters: Any,
+        parameters: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         rig = default_rig().with_servos(servo)
         servos = {} if real is None else {name: real for name, _ in rig.joints.items()}
         start = {"pan_right": 0.05}
-        self.head = FakeHead(rig, lambda time_s: PLACE, seeing, 3, start, mistaken=mistaken, servos=servos)
-        self.controller = GazeController(rig, GazeParameters(**parameters))
+        self.head = FakeHead(rig, lambda time_s: PLACE, vision, 3, start, mistaken=mistaken, servos=servos)
+        self.controller = GazeController(rig, gaze_parameters(parameters))
         self.outcomes: list[Outcome] = []
         self.errors_deg: list[np.ndarray] = []
         self.commands: list[np.ndarray] = []
@@ -91,12 +92,12 @@ def test_a_slow_detector_is_enough_for_a_class(servo: ServoSpec) -> None:
 @pytest.mark.parametrize("by_class", [True, False])
 def test_boxes_win_over_a_fovea_that_looks_past_a_small_target(by_class: bool) -> None:
     seeing = replace(DETECTOR, extent_rad=0.02)
-    run = Run(seeing, {"fovea": always(BEHIND)}, contrast="ignored")
+    run = Run(seeing, {"fovea": always(BEHIND)}, parameters={"verged.contrast": "ignored"})
     run.find() if by_class else run.click()
     run.until(3.0)
     assert run.worst_deg(100) < 0.4
     # without boxes, a click would have ended on what lies behind
-    blind = Run(replace(seeing, boxes=False), {"fovea": always(BEHIND)}, contrast="ignored")
+    blind = Run(replace(seeing, boxes=False), {"fovea": always(BEHIND)}, parameters={"verged.contrast": "ignored"})
     blind.click()
     blind.until(3.0)
     assert abs(blind.errors_deg[-1][1]) > 1.0
@@ -120,7 +121,7 @@ def test_boxes_of_something_else_change_nothing() -> None:
     assert run.worst_deg(100) < 0.25
 
 
-def test_boxes_say_that_the_tracker_went_astray() -> None:
+def test_boxes_say_that_the_tracker_follows_another_object() -> None:
     seeing = replace(DETECTOR, track=True, extent_rad=0.02)
     run = Run(seeing, {"track": lambda time_s: BEHIND if time_s > 1.0 else None})
     run.click()
@@ -134,7 +135,9 @@ def test_three_that_disagree_hold_the_eyes_still() -> None:
         "track": lambda time_s: BEHIND if time_s > 1.0 else None,
         "fovea": lambda time_s: 0.55 * PLACE if time_s > 1.0 else None,
     }
-    run = Run(seeing, wrong, contrast_enter=0.01)  # so that the goal is still in hand when they begin to differ
+    run = Run(
+        seeing, wrong, parameters={"verged.contrast_enter": 0.01}
+    )  # so that the goal is still active when they begin to differ
     run.click()
     run.until(3.5)
     assert run.outcomes[0].result is Result.DISAGREEMENT
@@ -176,21 +179,21 @@ def test_boxes_of_a_streamed_point_help() -> None:
 COARSE = SG90.replaced(pulse_step_rad=0.0077)  # a PCA9685 at 50 Hz
 
 
-def tell(time_s: float) -> list[Observation]:
+def resolution(time_s: float) -> list[Observation]:
     return [JointResolution(time_s, dict.fromkeys(("pan_left", "pan_right", "tilt"), COARSE.pulse_step_rad))]
 
 
-def test_a_coarse_resolution_is_believed_and_widens_what_is_stated() -> None:
+def test_a_coarse_resolution_is_used_and_widens_the_stated_interval() -> None:
     widths, turns = {}, {}
-    for told in (False, True):
-        run = Run(Seeing(), {}, SG90, real=COARSE)
-        run.until(0.2, tell if told else lambda time_s: [])
+    for published in (False, True):
+        run = Run(VisionModel(), {}, SG90, real=COARSE)
+        run.until(0.2, resolution if published else lambda time_s: [])
         run.click()
         run.until(5.0)
         target = run.report.target
-        widths[told] = target.high_m - target.low_m
-        turns[told] = int(np.count_nonzero(np.abs(np.diff(run.commands[-300:], axis=0)).max(axis=1)))
-        if told:
+        widths[published] = target.high_m - target.low_m
+        turns[published] = int(np.count_nonzero(np.abs(np.diff(run.commands[-300:], axis=0)).max(axis=1)))
+        if published:
             assert run.outcomes[0].result is Result.VERGED
             assert all(run.verged[-100:])
             assert target.low_m < float(np.linalg.norm(PLACE)) < target.high_m
@@ -200,7 +203,7 @@ def test_a_coarse_resolution_is_believed_and_widens_what_is_stated() -> None:
 
 
 def test_a_resolution_that_cannot_be_changes_nothing() -> None:
-    run = Run(Seeing(), {}, SG90)
+    run = Run(VisionModel(), {}, SG90)
     before = run.controller.resolution_rad
     odd = {"pan_left": math.nan, "pan_right": -0.1, "tilt": 9.0, "elbow": 0.01}
     run.until(0.3, lambda time_s: [JointResolution(time_s, odd)])

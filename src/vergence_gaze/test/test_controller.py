@@ -11,9 +11,10 @@ import pytest
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import FoveaDisparity, PointSighting
 from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, Result
+from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.phases import Phase
-from vergence_gaze.testing.fake_head import FakeHead, Seeing
+from vergence_gaze.testing.fake_head import FakeHead, VisionModel
 from vergence_rig.rig import Rig, default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 
@@ -73,7 +74,7 @@ def rig_with(servo: ServoSpec) -> Rig:
 @pytest.mark.parametrize("servo", [IDEAL, SG90, MG995], ids=["ideal", "sg90", "mg995"])
 @pytest.mark.parametrize("place", [(0.3, 0.05, 0.02), (0.6, 0.2, 0.1), (1.9, -0.6, -0.3)])
 def test_a_click_without_depth_is_verged_on_and_held(servo: ServoSpec, place: tuple[float, float, float]) -> None:
-    run = Run(rig_with(servo), fixed(*place), GazeParameters(), start_rad={"pan_right": 0.06}, seed=4)
+    run = Run(rig_with(servo), fixed(*place), gaze_parameters(), start_rad={"pan_right": 0.06}, seed=4)
     run.click()
     run.until(2.0)
     assert [outcome.result for outcome in run.outcomes] == [Result.VERGED]
@@ -87,14 +88,16 @@ def test_a_click_without_depth_is_verged_on_and_held(servo: ServoSpec, place: tu
 
 
 def test_nothing_moves_until_asked() -> None:
-    run = Run(rig_with(SG90), fixed(0.5, 0.1, 0.0), GazeParameters())
+    run = Run(rig_with(SG90), fixed(0.5, 0.1, 0.0), gaze_parameters())
     run.until(1.0)
     assert np.ptp(run.joints, axis=0).max() == 0.0
     assert set(run.phases) == {Phase.IDLE}
 
 
 def test_start_verge_needs_no_goal() -> None:
-    run = Run(rig_with(IDEAL), fixed(0.5, 0.0325, 0.0), GazeParameters(start="verge"), start_rad={"pan_right": 0.06})
+    run = Run(
+        rig_with(IDEAL), fixed(0.5, 0.0325, 0.0), gaze_parameters({"start": "verge"}), start_rad={"pan_right": 0.06}
+    )
     run.until(1.5)
     assert run.report.verged
     assert abs(run.errors_deg[-1][1]) < 0.1
@@ -105,7 +108,7 @@ def test_a_held_eye_does_not_turn(mode: str, held: int) -> None:
     baseline = default_rig().baseline_m
     place = fixed(0.5, (0.5 if held == 0 else -0.5) * baseline, 0.0)  # straight ahead of the held eye
     start = {"pan_right": 0.05} if held == 0 else {"pan_left": -0.05}
-    run = Run(rig_with(IDEAL), place, GazeParameters(mode=mode, tilt_enabled=False), start_rad=start)
+    run = Run(rig_with(IDEAL), place, gaze_parameters({"mode": mode, "tilt_enabled": False}), start_rad=start)
     run.click()
     run.until(2.0)
     assert [outcome.result for outcome in run.outcomes] == [Result.VERGED]
@@ -116,9 +119,9 @@ def test_a_held_eye_does_not_turn(mode: str, held: int) -> None:
 def test_a_target_beside_the_held_axis_is_verged_on_by_the_fovea_alone() -> None:
     azimuth = math.radians(0.7)
     place = fixed(0.6 * math.cos(azimuth), 0.5 * default_rig().baseline_m + 0.6 * math.sin(azimuth), 0.0)
-    parameters = GazeParameters(mode="left_held", tilt_enabled=False)
+    parameters = gaze_parameters({"mode": "left_held", "tilt_enabled": False})
     run = Run(
-        rig_with(SG90), place, parameters, seeing=Seeing(track=False, noise_px=0.1), start_rad={"pan_right": 0.05}
+        rig_with(SG90), place, parameters, vision=VisionModel(track=False, noise_px=0.1), start_rad={"pan_right": 0.05}
     )
     run.click()
     run.until(1.5)
@@ -130,7 +133,7 @@ def test_a_moving_target_is_followed() -> None:
         azimuth = math.radians(-10.0 + 20.0 * max(min(time_s, 2.5) - 1.0, 0.0))
         return 0.7 * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
 
-    run = Run(rig_with(IDEAL), ramp, GazeParameters())
+    run = Run(rig_with(IDEAL), ramp, gaze_parameters())
     run.click()
     run.until(2.4)
     assert np.abs(run.errors_deg[-60:]).max() < 1.0
@@ -145,7 +148,7 @@ def test_an_occluded_target_is_lost_honestly_and_found_again() -> None:
     run = Run(
         rig_with(SG90),
         fixed(0.8, 0.1, 0.0),
-        GazeParameters(),
+        gaze_parameters(),
         visible=lambda time_s: not 2.0 < time_s < 3.0,
         clutter=fixed(0.4, 0.05, 0.0),
     )
@@ -162,7 +165,7 @@ def test_an_occluded_target_is_lost_honestly_and_found_again() -> None:
 
 def test_a_detected_class_is_searched_and_verged_on() -> None:
     target = fixed(0.5, 0.55, 0.25)
-    run = Run(rig_with(SG90), target, GazeParameters(), seeing=Seeing(boxes=True, track=False))
+    run = Run(rig_with(SG90), target, gaze_parameters(), vision=VisionModel(boxes=True, track=False))
     run.controller.look_at(Goal(GoalKind.CLASS, class_name="target"), run.head.time_s)
     run.until(5.0)
     assert [outcome.result for outcome in run.outcomes] == [Result.VERGED]
@@ -174,8 +177,8 @@ def test_a_detected_class_is_searched_and_verged_on() -> None:
 @pytest.mark.parametrize("contrast", ["required", "when_seen", "ignored"])
 def test_a_stream_of_points_is_followed(contrast: str, image_latency_s: float) -> None:
     place = (0.6, -0.2, 0.1)
-    seeing = Seeing(latency_s=image_latency_s)
-    run = Run(rig_with(IDEAL), fixed(*place), GazeParameters(contrast=contrast), seeing=seeing)
+    vision = VisionModel(latency_s=image_latency_s)
+    run = Run(rig_with(IDEAL), fixed(*place), gaze_parameters({"verged.contrast": contrast}), vision=vision)
     # Points are of the present, images of a while ago.
     run.until(1.8, lambda time_s: [PointSighting(time_s, place, math.nan)])
     assert run.report.verged
@@ -184,7 +187,7 @@ def test_a_stream_of_points_is_followed(contrast: str, image_latency_s: float) -
 
 def test_a_stream_beside_the_eyes_images_is_not_verged() -> None:
     named, shown = (0.6, -0.2, 0.1), (0.6, 0.1, 0.0)
-    run = Run(rig_with(IDEAL), fixed(*shown), GazeParameters())
+    run = Run(rig_with(IDEAL), fixed(*shown), gaze_parameters())
     run.until(1.5, lambda time_s: [PointSighting(time_s, named, math.nan)])
     assert not any(run.verged)
 
@@ -204,9 +207,11 @@ def goals_that_end(result: Result) -> list[tuple[Goal, dict[str, Any]]]:
             (Goal(GoalKind.ANGLES, version_rad=math.nan), {}),
             (Goal(GoalKind.CLASS, class_name="cup", time_limit_s=-1.0), {}),
         ],
-        Result.NO_IMAGES: [(pixel, {"seeing": Seeing(latency_s=1e6)})],
+        Result.NO_IMAGES: [(pixel, {"vision": VisionModel(latency_s=1e6)})],
         Result.LOST: [(pixel, {"visible": lambda time_s: False})],
-        Result.TIMED_OUT: [(pixel, {"seeing": Seeing(fovea=False, track=False), "parameters": {"lost_after_s": 9.0}})],
+        Result.TIMED_OUT: [
+            (pixel, {"vision": VisionModel(fovea=False, track=False), "parameters": {"target.lost_after_s": 9.0}})
+        ],
     }
     return endings[result]
 
@@ -217,7 +222,7 @@ ENDINGS = (Result.UNREACHABLE, Result.INVALID, Result.NO_IMAGES, Result.LOST, Re
 @pytest.mark.parametrize("result", ENDINGS, ids=lambda result: result.name.lower())
 def test_goals_name_why_they_fail(result: Result) -> None:
     for goal, options in goals_that_end(result):
-        parameters = GazeParameters().replaced(**options.pop("parameters", {}))
+        parameters = gaze_parameters(options.pop("parameters", {}))
         run = Run(rig_with(SG90), fixed(0.7, 0.1, 0.0), parameters, **options)
         run.controller.look_at(goal, run.head.time_s)
         run.until(6.0)
@@ -226,7 +231,7 @@ def test_goals_name_why_they_fail(result: Result) -> None:
 
 
 def test_preempted_cancelled_and_stopped() -> None:
-    run = Run(rig_with(SG90), fixed(0.7, 0.1, 0.0), GazeParameters())
+    run = Run(rig_with(SG90), fixed(0.7, 0.1, 0.0), gaze_parameters())
     first, second = run.click(), run.click()
     run.until(0.15)
     run.controller.cancel(run.head.time_s)
@@ -242,7 +247,9 @@ def test_preempted_cancelled_and_stopped() -> None:
 
 
 def test_estimators_that_disagree_hold_the_eyes_still() -> None:
-    unattainable = GazeParameters(contrast_enter=0.01)  # so that the goal is still in hand when they begin to differ
+    unattainable = gaze_parameters(
+        {"verged.contrast_enter": 0.01}
+    )  # so that the goal is still active when they begin to differ
     run = Run(rig_with(IDEAL), fixed(0.7, 0.05, 0.0), unattainable)
     run.click()
     run.until(1.0)

@@ -11,28 +11,30 @@ import pytest
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import BoxSighting, Observation, TrackSighting
 from vergence_gaze.goals.goal import Goal, GoalKind
-from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.phases import Phase
-from vergence_gaze.testing.fake_head import TICK_S, FakeHead, Seeing
+from vergence_gaze.testing.fake_head import TICK_S, FakeHead, VisionModel
 from vergence_rig.geometry import gaze_for_point
 from vergence_rig.rig import default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 
 CONTROL_TICKS = 6
-FRAME_RATE = Seeing(track=False, boxes=True, box_frame_ticks=10, box_latency_s=0.06, box_noise_px=0.4, box_miss_share=0)
-DETECTOR = Seeing(track=False, boxes=True, box_frame_ticks=20, box_latency_s=0.1, box_noise_px=1.2, noise_px=0.4)
+FRAME_RATE = VisionModel(
+    track=False, boxes=True, box_frame_ticks=10, box_latency_s=0.06, box_noise_px=0.4, box_miss_share=0
+)
+DETECTOR = VisionModel(track=False, boxes=True, box_frame_ticks=20, box_latency_s=0.1, box_noise_px=1.2, noise_px=0.4)
 Place = Callable[[float], np.ndarray]
 
 
 @dataclass
 class Trial:
-    """What came of a target that is known by its class, or by a click; sampled at the control rate.
+    """What came of a target requested by its class, or by a click; sampled at the control rate.
 
     `arriving` alters what arrives at a time, or withholds it (None).
     """
 
     target: Place
-    seeing: Seeing
+    vision: VisionModel
     servo: ServoSpec = IDEAL
     until_s: float = 4.0
     law: str = "predictive"
@@ -46,8 +48,8 @@ class Trial:
         rig = default_rig().with_servos(self.servo)
         fixating = gaze_for_point(self.target(0.0), rig.baseline_m).as_dict()
         start = fixating if self.start_rad is None else self.start_rad
-        head = FakeHead(rig, self.target, self.seeing, self.seed, start, mistaken=self.mistaken)
-        controller = GazeController(rig, GazeParameters(law=self.law), CONTROL_TICKS * TICK_S)
+        head = FakeHead(rig, self.target, self.vision, self.seed, start, mistaken=self.mistaken)
+        controller = GazeController(rig, gaze_parameters({"law": self.law}), CONTROL_TICKS * TICK_S)
         arrived: list[Any] = []
         samples: list[tuple[float, float, Phase, bool]] = []
         for tick in range(1, int(self.until_s / TICK_S)):
@@ -115,8 +117,8 @@ def test_eyes_in_a_saccade_are_not_called_verged() -> None:
 
 
 def test_a_moving_target_that_a_slow_detector_shows_on_the_axes_is_called_verged() -> None:
-    seeing = replace(DETECTOR, box_latency_s=0.17, latency_s=0.12)
-    trial = Trial(lambda time_s: place(0.6, 5.0 * (max(time_s, 0.8) - 2.5)), seeing, SG90, until_s=5.0)
+    vision = replace(DETECTOR, box_latency_s=0.17, latency_s=0.12)
+    trial = Trial(lambda time_s: place(0.6, 5.0 * (max(time_s, 0.8) - 2.5)), vision, SG90, until_s=5.0)
     late = trial.time_s > 2.5
     assert trial.verged[late].mean() > 0.6
     assert trial.error_deg[late & trial.verged].max() < 1.0
@@ -148,9 +150,9 @@ def test_a_target_that_passes_before_another_is_kept(click: bool, seed: int) -> 
         return mistaken
 
     mistaken = {"fovea": taken_for(2.5, 0.5), "track": taken_for(2.5, 0.5), "box": taken_for(6.0, 0.3)}
-    seeing = Seeing(noise_px=0.4) if click else DETECTOR
+    vision = VisionModel(noise_px=0.4) if click else DETECTOR
     target = lambda time_s: place(0.6, azimuth_deg(time_s))  # noqa: E731
-    trial = Trial(target, seeing, SG90, 5.0, click=click, seed=seed, mistaken=mistaken)
+    trial = Trial(target, vision, SG90, 5.0, click=click, seed=seed, mistaken=mistaken)
     assert trial.error_deg[trial.time_s > 4.5].max() < 1.0
     if click:
         assert trial.error_deg[np.abs(trial.time_s - 2.5) < 0.6].max() < 2.0
@@ -167,7 +169,7 @@ def test_eyes_that_swing_over_the_target_are_not_called_verged(servo: ServoSpec,
     assert trial.error_deg[trial.verged].max() < 1.0
 
 
-LOADED = Seeing(
+LOADED = VisionModel(
     latency_s=0.12, frame_ticks=15, noise_px=0.4, boxes=True, box_frame_ticks=60, box_latency_s=0.16, box_noise_px=0.8
 )
 """As on two full cores: 20 pairs a second, boxes at 5 Hz."""
@@ -191,8 +193,8 @@ def test_a_track_that_slips_is_put_right_by_the_boxes(target: Place) -> None:
 
 
 def test_a_moving_target_that_only_late_boxes_show_is_followed() -> None:
-    seeing = replace(LOADED, track=False, box_latency_s=0.6, box_frame_ticks=45)
-    trial = Trial(to_and_fro, seeing, until_s=8.0, click=True)
+    vision = replace(LOADED, track=False, box_latency_s=0.6, box_frame_ticks=45)
+    trial = Trial(to_and_fro, vision, until_s=8.0, click=True)
     assert np.median(trial.error_deg[trial.time_s > 2.5]) < 1.5
     assert trial.error_deg[trial.time_s > 2.5].max() < 4.0
 
@@ -226,12 +228,12 @@ def test_the_tracker_follows_a_class_between_its_boxes(servo: ServoSpec) -> None
     assert both.verged[both.time_s > 3.0].mean() > 0.8
 
 
-def test_a_track_of_which_no_box_tells_any_more_is_not_followed_for_long() -> None:
+def test_a_track_without_boxes_is_not_followed_for_long() -> None:
     def no_boxes_later(observation: Observation, time_s: float) -> Observation | None:
         return None if isinstance(observation, BoxSighting) and time_s > 2.0 else observation
 
-    seeing = replace(SLOW_DETECTOR, track=True, fovea=False)
-    trial = Trial(lambda time_s: place(0.8, 0.0), seeing, arriving=no_boxes_later, until_s=5.0)
+    vision = replace(SLOW_DETECTOR, track=True, fovea=False)
+    trial = Trial(lambda time_s: place(0.8, 0.0), vision, arriving=no_boxes_later, until_s=5.0)
     known = [phase for phase, time_s in zip(trial.phases, trial.time_s, strict=True) if 1.5 < time_s < 2.5]
     assert set(known) == {Phase.FIXATE}
     assert Phase.LOST in [phase for phase, time_s in zip(trial.phases, trial.time_s, strict=True) if time_s < 4.0]
@@ -245,7 +247,7 @@ def test_a_track_that_locked_beside_what_is_wanted_does_not_pull_the_eyes_there(
             return observation
         return replace(observation, left_y=observation.left_y + math.radians(below_deg))
 
-    seeing = replace(SLOW_DETECTOR, track=True)
-    trial = Trial(lambda time_s: place(0.8, 5.0), seeing, SG90, arriving=beside, start_rad={"pan_right": 0.06})
+    vision = replace(SLOW_DETECTOR, track=True)
+    trial = Trial(lambda time_s: place(0.8, 5.0), vision, SG90, arriving=beside, start_rad={"pan_right": 0.06})
     assert trial.error_deg[trial.time_s > 1.0].max() < 0.75
     assert trial.verged[trial.time_s > 1.0].all()

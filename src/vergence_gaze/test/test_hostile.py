@@ -9,8 +9,8 @@ import pytest
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import (
     BoxSighting,
-    EdgeJudgement,
-    EyeRotationReading,
+    EdgeContrast,
+    EyeRotationObservation,
     FoveaDisparity,
     JointReport,
     JointResolution,
@@ -20,7 +20,8 @@ from vergence_gaze.estimation.observations import (
 )
 from vergence_gaze.goals.goal import Goal, GoalKind
 from vergence_gaze.joints.limits import LONGEST_STEP_S, CommandLimits
-from vergence_gaze.parameters import LAWS, GazeParameters
+from vergence_gaze.law_registry import law_names
+from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_rig.rig import JOINT_NAMES, default_rig
 
 ODD = (math.nan, math.inf, -math.inf, 1e300, -1e300, 0.0, 1e-300)
@@ -67,12 +68,12 @@ class Hostile:
         if kind == 5:
             return PointSighting(stamp, (v(1.0), v(0.5), v(0.5)), v(0.01))
         if kind == 6:
-            return EyeRotationReading(stamp, skew, v(0.1), v(0.01), self.flag())
+            return EyeRotationObservation(stamp, skew, v(0.1), v(0.01), self.flag())
         if kind == 7:
             names = [*JOINT_NAMES, "elbow"]
             steps = {str(name): v(0.01) for name in self._random.choice(names, self._random.integers(1, 5))}
             return JointResolution(stamp, steps)
-        return EdgeJudgement(stamp, abs(v(0.5)), v(3.0), self.flag())
+        return EdgeContrast(stamp, abs(v(0.5)), v(3.0))
 
     def goal(self) -> Goal:
         v = self.value
@@ -98,12 +99,12 @@ class Hostile:
         return 0.01
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", law_names())
 @pytest.mark.parametrize("seed", [1, 2])
 def test_every_command_keeps_every_limit(law: str, seed: int) -> None:
     rig, hostile = default_rig(), Hostile(seed)
     limits = CommandLimits(rig)
-    controller = GazeController(rig, GazeParameters(law=law, start="verge" if seed == 1 else "idle"))
+    controller = GazeController(rig, gaze_parameters({"law": law, "start": "verge" if seed == 1 else "idle"}))
     good: dict[str, Any] = dict.fromkeys(JOINT_NAMES, 0.0)
     now_s, last, last_s = 100.0, None, math.nan
     for cycle in range(2500):

@@ -1,0 +1,147 @@
+"""Where the eyes were when an image was exposed.
+
+Joint states of a hobby servo are commands passed through a speed limit, not measurements: the shaft follows them with
+the play of its dead band and gears. Beside the reported angles there is therefore an estimate of the shafts'. A fast
+servo turns in a small part of the time between two reports; the commands and the servos' latency give when.
+"""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_rig.joint_history import JointHistory, JointSample, interpolated
+from vergence_rig.rig import JOINT_NAMES, Rig
+
+Array = npt.NDArray[np.float64]
+
+_KEEP_S = 3.0
+_HOLD_S = 0.2
+_CLOCK_JUMP_S = 1.0
+_MOST_COMMANDS = 1000
+_INSTANT_S = 1e-4
+_STILL = np.zeros(3)
+
+
+class ShaftHistory:
+    """Reported and estimated joint angles, (3,) in the order of JOINT_NAMES [rad], over the last seconds."""
+
+    def __init__(self, rig: Rig) -> None:
+        servos = [joint.servo for _, joint in rig.joints.items()]
+        self._half_play = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
+        self._speed = np.array([servo.speed_rad_s for servo in servos])
+        self._latency = np.array([servo.command_latency_s for servo in servos])
+        self._longest_latency_s = float(self._latency.max())
+        self._commands_s: deque[float] = deque(maxlen=_MOST_COMMANDS)
+        self._reported = JointHistory(_KEEP_S, _HOLD_S)
+        self._shafts = JointHistory(_KEEP_S, _HOLD_S)
+
+    @property
+    def known(self) -> bool:
+        """True once every joint has been reported."""
+        return self._reported.known
+
+    @property
+    def newest_s(self) -> float:
+        """Stamp of the newest report; NaN before the first."""
+        return self._reported.newest.stamp if self._reported.known else math.nan
+
+    @property
+    def reported_rad(self) -> Array:
+        """The newest reported angles (3,)."""
+        return self._reported.newest.angles_rad
+
+    @property
+    def shaft_rad(self) -> Array:
+        """The newest estimated shaft angles (3,)."""
+        return self._shafts.newest.angles_rad
+
+    @property
+    def half_play_rad(self) -> Array:
+        """Half of each joint's dead band and backlash together (3,)."""
+        return self._half_play
+
+    def add(self, stamp_s: float, positions_rad: Mapping[str, float]) -> bool:
+        """Add one report; a joint that it lacks keeps its last angle.
+
+        Returns False, and adds nothing, for a late stamp, or while a joint has never been reported. A stamp that runs
+        back by more than a second means that the clock was set: the history starts again.
+        """
+        if not math.isfinite(stamp_s):
+            return False
+        if self.known and stamp_s < self.newest_s - _CLOCK_JUMP_S:
+            self.clear()
+        if self.known and stamp_s <= self.newest_s:
+            return False
+        angles = self.reported_rad.copy() if self.known else np.full(3, np.nan)
+        for i, name in enumerate(JOINT_NAMES):
+            value = positions_rad.get(name, math.nan)
+            if math.isfinite(value) and abs(value) <= math.tau:
+                angles[i] = value
+        shafts = self._shafts.newest.angles_rad if self.known else angles
+        if not self._reported.add(stamp_s, JOINT_NAMES, angles.tolist()):
+            return False
+        shafts = np.clip(shafts, angles - self._half_play, angles + self._half_play)
+        return self._shafts.add(stamp_s, JOINT_NAMES, shafts.tolist())
+
+    def clear(self) -> None:
+        """Remove all reports and commands."""
+        self._reported.clear()
+        self._shafts.clear()
+        self._commands_s.clear()
+
+    def on_command(self, now_s: float) -> None:
+        """Record that a command is sent now: the joints begin to turn after it by their servos' latency."""
+        if not self._commands_s or now_s > self._commands_s[-1]:
+            self._commands_s.append(now_s)
+
+    def covers(self, stamp_s: float) -> bool:
+        """Return whether the angles at `stamp_s` are known: not before the first report, nor long after the last."""
+        return self._reported.covers(stamp_s)
+
+    def shaft_at(self, stamp_s: float) -> Array:
+        """Return the estimated shaft angles (3,) at `stamp_s`; the ends are held."""
+        reported, (before, _) = self.reported_at(stamp_s), self._shafts.bracket(stamp_s)
+        return np.clip(before.angles_rad, reported - self._half_play, reported + self._half_play)
+
+    def reported_at(self, stamp_s: float) -> Array:
+        """Return the angles (3,) at `stamp_s` as they would have been reported then; the ends are held."""
+        before, after = self._reported.bracket(stamp_s)
+        if not (before.angles_rad != after.angles_rad).any():
+            return before.angles_rad
+        onset_s = self._onset_s(before.stamp, after.stamp)
+        if onset_s is None:
+            return interpolated(before, after, stamp_s)
+        return self._turning_from(onset_s, before, after, stamp_s)
+
+    def speed_within(self, begin_s: float, end_s: float, along_rad_s: Array = _STILL) -> float:
+        """Return the fastest joint's greatest speed between two times [rad/s]; 0 where nothing is known.
+
+        With `along_rad_s` (3,) it is the speed relative to these: how fast the eyes slip off a target that moves so.
+        """
+        samples = self._reported.spanning(begin_s, end_s)
+        fastest = 0.0
+        for before, after in pairwise(samples):
+            speeds = (after.angles_rad - before.angles_rad) / max(after.stamp - before.stamp, 1e-4)
+            fastest = max(fastest, float(np.abs(speeds - along_rad_s).max()))
+        return fastest
+
+    def _turning_from(self, onset_s: Array, before: JointSample, after: JointSample, stamp_s: float) -> Array:
+        """Return the angles (3,) between two reports of joints that began to turn at `onset_s` (3,)."""
+        way = after.angles_rad - before.angles_rad
+        duration_s = np.maximum(np.abs(way) / self._speed, _INSTANT_S)
+        onset_s = np.clip(onset_s, before.stamp, np.maximum(after.stamp - duration_s, before.stamp))
+        return before.angles_rad + np.clip((stamp_s - onset_s) / duration_s, 0.0, 1.0) * way
+
+    def _onset_s(self, begin_s: float, end_s: float) -> Array | None:
+        """Return when each joint (3,) began to turn between two reports, None without a command for it."""
+        for command_s in reversed(self._commands_s):
+            if command_s + self._longest_latency_s < begin_s:
+                return None
+            onset_s = command_s + self._latency
+            if (onset_s < end_s).any():
+                return onset_s
+        return None

@@ -1,0 +1,68 @@
+"""All parameter groups of gaze_controller_node: the fixed ones and those of every registered law."""
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import vergence_gaze.laws  # noqa: F401  registers the shipped laws
+from vergence_gaze.law_registry import law_groups
+from vergence_gaze.parameters import (
+    ExposureParameters,
+    GazeNodeParameters,
+    GazeParameters,
+    SaccadeParameters,
+    SearchParameters,
+    ServoParameters,
+    TargetParameters,
+    VergedParameters,
+)
+from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError
+
+_FIXED: Groups = (
+    ("", GazeNodeParameters),
+    ("saccade.", SaccadeParameters),
+    ("exposure.", ExposureParameters),
+    ("servo.", ServoParameters),
+    ("target.", TargetParameters),
+    ("verged.", VergedParameters),
+    ("search.", SearchParameters),
+)
+_NONE: Mapping[str, Any] = MappingProxyType({})
+
+
+def gaze_groups() -> Groups:
+    """Return all groups, those of laws that were registered later included."""
+    return _FIXED + law_groups()
+
+
+GROUPS: Groups = gaze_groups()
+"""The groups as shipped."""
+
+
+def collected(groups: Iterable[Parameters]) -> GazeParameters:
+    """Return the controller's parameters from one instance of every group."""
+    by_kind: dict[type[Parameters], Any] = {type(group): group for group in groups}
+    control, saccade, exposure, servo, target, verged, search = (by_kind[kind] for _, kind in _FIXED)
+    laws = tuple(by_kind[kind] for _, kind in law_groups())
+    return GazeParameters(control, saccade, exposure, servo, target, verged, search, laws)
+
+
+def gaze_parameters(values: Mapping[str, Any] = _NONE) -> GazeParameters:
+    """Return validated parameters from full names such as "verged.enter_rad"; the others have their defaults.
+
+    Raises ParameterError, with the full name, for an unknown name or an invalid value.
+    """
+    groups = gaze_groups()
+    known = {prefix + spec.name for prefix, kind in groups for spec in kind.specs()}
+    for name, value in values.items():
+        if name not in known:
+            raise UnknownParameterError(name, value, known)
+    return collected(_group(prefix, kind, values) for prefix, kind in groups)
+
+
+def _group(prefix: str, kind: type[Parameters], values: Mapping[str, Any]) -> Parameters:
+    own = {spec.name: values[prefix + spec.name] for spec in kind.specs() if prefix + spec.name in values}
+    try:
+        return kind.from_mapping(own)
+    except ParameterError as error:
+        raise ParameterError(prefix + error.name, error.value, error.allowed) from None
