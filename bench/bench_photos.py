@@ -21,7 +21,7 @@ from bench.results import Row, table
 
 __all__ = ["run", "table"]
 
-CLICKS = 6
+CLICKS = 12
 _PROCESSES = 2
 _TRIALS_OF_A_JOB = 4
 

@@ -13,18 +13,19 @@ from bench.results import Row
 
 MISMATCHES = [name for name in SETTINGS if name.startswith("mismatch.")]
 _NEAR_DEG = 5.0
+_CLICKS_OF_A_PLANT = 2
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
 
 def trials(clicks: int) -> list[Trial]:
-    """Return every click: `clicks` a pair with SG90 servos, a third of them with other plants; all of the lighting's.
+    """Return every click: `clicks` a pair with SG90 servos, two with every other plant; all of the lighting's.
 
     Those of one pair stand together.
     """
     found: list[Trial] = []
     for number, name in enumerate(pair_names()):
         main = targets(name, 24 if name == LIT_DIFFERENTLY else clicks)
-        fewer = targets(name, max(clicks // 3, 1))
+        fewer = targets(name, min(clicks, _CLICKS_OF_A_PLANT))
         chosen = [(target, "sg90") for target in main]
         chosen += [(target, setting) for setting in ("ideal", *MISMATCHES) for target in fewer]
         found += [
