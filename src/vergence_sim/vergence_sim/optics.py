@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.rig import CameraSpec
-from vergence_sim.parameters import RightCameraParameters, SimParameters
+from vergence_sim.camera_parameters import RightCameraParameters
+from vergence_sim.parameters import SimParameters
 
 Image = npt.NDArray[np.uint8]
 

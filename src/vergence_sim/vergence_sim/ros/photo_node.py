@@ -15,7 +15,8 @@ from vergence_rig.geometry import GeometryError, eye_direction, point_at
 from vergence_rig.parameters import ParameterError
 from vergence_rig.rig import CameraSpec, load_rig
 from vergence_rig.servo import IDEAL
-from vergence_sim.parameters import CameraParameters, LeftCameraParameters, RightCameraParameters, SimParameters
+from vergence_sim.camera_parameters import CameraParameters, LeftCameraParameters, RightCameraParameters
+from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.joints import Plant
 from vergence_sim.photo.pair import PhotoPoint, read_pair
 from vergence_sim.photo.parameters import GROUPS, PhotoParameters, PlantParameters, sim_parameters
