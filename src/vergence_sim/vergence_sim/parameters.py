@@ -1,7 +1,7 @@
 """The simulator's parameters in groups: the simulation, the world, the cameras, the target and its motion."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError, parameter
@@ -237,13 +237,13 @@ _IDEAL: Mapping[str, Any] = {
 class SimParameters:
     """Every parameter group of the simulator, in the order of GROUPS. The defaults equal config/sim_node.yaml."""
 
-    simulation: SimulationParameters = SimulationParameters()
-    world: WorldParameters = WorldParameters()
-    camera: CameraParameters = CameraParameters()
-    left_camera: LeftCameraParameters = LeftCameraParameters()
-    right_camera: RightCameraParameters = RightCameraParameters()
-    target: TargetParameters = TargetParameters()
-    motion: MotionParameters = MotionParameters()
+    simulation: SimulationParameters = field(default_factory=SimulationParameters)
+    world: WorldParameters = field(default_factory=WorldParameters)
+    camera: CameraParameters = field(default_factory=CameraParameters)
+    left_camera: LeftCameraParameters = field(default_factory=LeftCameraParameters)
+    right_camera: RightCameraParameters = field(default_factory=RightCameraParameters)
+    target: TargetParameters = field(default_factory=TargetParameters)
+    motion: MotionParameters = field(default_factory=MotionParameters)
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> "SimParameters":
@@ -262,10 +262,10 @@ class SimParameters:
             if name not in known:
                 raise UnknownParameterError(name, value, known)
         groups = []
-        for (prefix, kind), field in zip(GROUPS, fields(self), strict=True):
+        for (prefix, kind), member in zip(GROUPS, fields(self), strict=True):
             own = {spec.name: values[prefix + spec.name] for spec in kind.specs() if prefix + spec.name in values}
             try:
-                groups.append(getattr(self, field.name).replaced(**own))
+                groups.append(getattr(self, member.name).replaced(**own))
             except ParameterError as error:
                 raise ParameterError(prefix + error.name, error.value, error.allowed) from None
         return SimParameters(*groups)
