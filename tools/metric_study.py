@@ -2,7 +2,7 @@
 
     source env.sh && python tools/metric_study.py [--out docs]
 
-Everything in the page is measured by this run; nothing is typed in but the paper's own figures.
+Every value in the page is measured by this run, except the paper's own.
 """
 
 import argparse
@@ -63,7 +63,7 @@ SCENES = (
 
 @dataclass(frozen=True)
 class Sweep:
-    """What one scene gave: each form and chance (errors, windows, directions), the foveal contrast (errors,)."""
+    """Measurements of one scene: each form and chance (errors, windows, directions), the foveal contrast (errors,)."""
 
     scene: Scene
     figures: dict[str, Figures]
@@ -77,14 +77,14 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Basin:
-    """Where a curve is least, and how wide it stays below the middle of its least and its median value."""
+    """Position of a curve's minimum, and the width below the mean of its least and its median value."""
 
     minimum_deg: float
     width_deg: float
 
 
 def sweep(scene: Scene, windows_px: Sequence[int]) -> Sweep:
-    """Turn the right eye past vergence while the left one holds the target, as the paper does, and measure."""
+    """Measure while the right eye is rotated past vergence and the left one fixates the target, as in the paper."""
     metric = EdgeMetric(EdgeParameters(windows_px=tuple(windows_px)))
     rows: dict[str, list[Figures]] = {form: [] for form in (*FORMS, "chance")}
     foveal = []
@@ -191,38 +191,38 @@ def page(results: Sequence[Sweep], windows_px: Sequence[int], images: Sequence[s
     of = len(results) * len(windows_px)
     ratio = np.array([r.figures["plain"][vergence].mean() / np.nanmedian(r.figures["plain"]) for r in results])
     judged = [(r.foveal[vergence], float(np.nanmin(r.foveal[np.abs(ERRORS_DEG) >= 1.0]))) for r in results]
-    told_apart = [[r.scene.name, f"{v:.2f}", f"{u:.2f}"] for r, (v, u) in zip(results, judged, strict=True)]
+    separation = [[r.scene.name, f"{v:.2f}", f"{u:.2f}"] for r, (v, u) in zip(results, judged, strict=True)]
     threshold = VergedParameters().enter_contrast
     passing, dipping = (sum(pair[i] <= threshold for pair in judged) for i in (0, 1))
     return (
         f"""# The edge metric against vergence error
 
-Written by `python tools/metric_study.py`; every figure below was measured by that run.
+Written by `python tools/metric_study.py`; every value below is from that run.
 
-The left eye holds the target, the right one is turned past it from {ERRORS_DEG[0]:+.0f} to
-{ERRORS_DEG[-1]:+.0f} degrees in steps of {ERRORS_DEG[1] - ERRORS_DEG[0]:.2f} (positive: the eyes have to converge more;
+The left eye fixates the target; the right eye is rotated past it from {ERRORS_DEG[0]:+.0f} to
+{ERRORS_DEG[-1]:+.0f} degrees in steps of {ERRORS_DEG[1] - ERRORS_DEG[0]:.2f} (positive: the eyes must converge more;
 one degree is about 9.4 px at 640x480). Target, room, textures and distance differ from scene to scene; the cameras have
-the simulator's default faults: noise, exposure and white balance, JPEG, roll and vertical offset, which `align: auto`
-finds and takes out.
+the simulator's default faults: noise, exposure and white balance, JPEG, roll and vertical offset, which
+`align.mode: auto` estimates and removes.
 
 - **plain** is the paper's metric, **robust** its truncated, oriented form weighted to the fovea, **contrast** the
   oriented, truncated distance over its chance level; curves are means of both directions. **foveal** is the contrast
-  that judges.
-- The **minimum** lies where a curve is least. Its **basin** is the range around it in which the curve stays below the
-  middle between its least and its median value.
+  by which `verged` is decided.
+- The **minimum** is the error at which a curve is least. Its **basin** is the range around it in which the curve stays
+  below the mean of its least and its median value.
 
-## At vergence, beside the paper
+## At vergence, compared with the paper
 
 The paper reports {PAPER}. Mean over {len(results)} scenes (least to largest):
 
 {table(["window", *both_ways, "contrast"], at_vergence)}
 
-The plain figure at vergence is {ratio.mean():.2f} times its own median over the whole sweep ({ratio.min():.2f} to
-{ratio.max():.2f}): low where the target fills the window, close to what any other angle gives where it does not. As in
-the paper it grows with the window, and differs with the direction, wherever a window holds other depths. The robust
-form hardly depends on the window, for it is weighted to what the eye is turned to.
+The plain metric at vergence is {ratio.mean():.2f} times its own median over the whole sweep ({ratio.min():.2f} to
+{ratio.max():.2f}): low where the target fills the window, close to its value at any other angle where it does not.
+As in the paper it grows with the window, and differs with the direction, where a window holds other depths. The robust
+form hardly depends on the window, because it is weighted to the fovea.
 
-## Where the minimum lies and how wide its basin is
+## Position of the minimum and width of its basin
 
 Minimum: median distance from vergence and largest, in degrees; basin: median width in degrees.
 
@@ -233,14 +233,14 @@ Of {of} curves each (scenes times windows) the minimum lies within {NEAR_VERGENC
 
 ## Telling vergence from clutter
 
-Foveal contrast at vergence, and the least it reads anywhere at an error of 1 degree or more (the shipped threshold is
-{threshold:g}; the judge also asks for a small, confident signed error):
+Foveal contrast at vergence, and its least value at any error of 1 degree or more (the default threshold is
+{threshold:g}; `verged` also needs a small, confident signed error):
 
-{table(["scene", "at vergence", "least at 1 degree or more"], told_apart)}
+{table(["scene", "at vergence", "least at 1 degree or more"], separation)}
 
 {passing} of {len(results)} scenes pass at vergence;
-{dipping} dip below the threshold somewhere else: there another thing, or a repetition of the
-same texture (the squares of the cube), lies on the horopter, and only the signed error tells.
+{dipping} fall below the threshold at another angle: there another object, or a repetition of the
+same texture (the squares of the cube), lies on the horopter, and only the signed error distinguishes them.
 
 ## Where it fails
 
@@ -248,9 +248,9 @@ Curves whose minimum is more than {NEAR_VERGENCE_DEG} degree from vergence:
 
 {table(["scene", "form", "window [px]: minimum [deg] (value there / at vergence)"], failures) if failures else "None."}
 
-What they have in common: the target fills little of the window, so that the curve is least where the background is
-aligned. Small windows, the robust form and the foveal contrast put that off; none of them can see a target that has no
-edges of its own in the fovea. None of the forms says which way to turn: that is the signed disparity's task.
+In all of them the target fills little of the window, so that the curve is least where the background is aligned. Small
+windows, the robust form and the foveal contrast reduce that; none of them detects a target without edges in the fovea.
+None of the forms gives the direction of the error: that is the task of the signed disparity.
 
 ## Curves
 

@@ -147,7 +147,7 @@ def test_contrast_is_least_at_the_disparity_of_a_real_board_s_corners(number: in
     x, y = (round(float(value)) for value in left_corners[9 * row + column])
     inside = (np.abs(left_corners - (x, y)) <= 25).all(axis=1)
     disparity, vertical = (left_corners - right_corners)[inside].mean(axis=0)
-    # A board at a slant has a range of disparities in the window; the corners around it tell which.
+    # A slanted board has a range of disparities in the window; it is given by the corners around it.
     around = (np.abs(left_corners - (x, y)) <= 50).all(axis=1)
     half_range = 0.25 * float(np.ptp((left_corners - right_corners)[around, 0]))
 

@@ -93,7 +93,7 @@ def test_true_vergence_is_read_where_the_joints_are_off(version: float, vergence
     assert reading.rotation is not None
     assert math.degrees(reading.rotation.vergence_rad - vergence) == pytest.approx(0.0, abs=0.05)
     assert reading.joint_vergence_rad == pytest.approx(vergence - 0.01)
-    # Both rolls move alike: what depth tells of them is their difference.
+    # Both rolls have the same effect: depth determines only their difference.
     _, right_roll, right_pitch, _, left_roll = reading.rotation.corrections_rad
     assert right_roll - left_roll == pytest.approx(0.006, abs=5e-4)
     assert right_pitch == pytest.approx(0.009, abs=1e-3)
