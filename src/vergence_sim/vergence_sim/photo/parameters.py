@@ -5,13 +5,8 @@ from dataclasses import dataclass
 from vergence_rig.parameters import REQUIRED, Groups, ParameterError, Parameters, parameter
 from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_rig.servo import PRESETS
-from vergence_sim.parameters import (
-    CameraParameters,
-    LeftCameraParameters,
-    RightCameraParameters,
-    SimParameters,
-    SimulationParameters,
-)
+from vergence_sim.camera_parameters import CameraParameters, LeftCameraParameters, RightCameraParameters
+from vergence_sim.parameters import SimParameters, SimulationParameters
 from vergence_sim.photo.joints import Plant
 from vergence_sim.photo.pair import PhotoPoint
 
