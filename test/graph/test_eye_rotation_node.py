@@ -136,7 +136,7 @@ def test_the_true_vergence_is_read_although_the_joints_are_off(graph: Any, seen:
 def test_moving_eyes_are_not_measured(head: Head, seen: StereoFrame) -> None:
     # Until the joints reach back far enough, that is the reason; the turn comes to light after it.
     reasons: list[str] = []
-    while not any("a joint turned by" in reason for reason in reasons):
+    while not any("a joint moved by" in reason for reason in reasons):
         message = head.until(EyeRotation.STATUS_MOVING, seen.left, seen.right, turn_rad=0.05)
         assert is_silent(message)
         reasons.append(message.reason)
@@ -156,12 +156,12 @@ def test_unrelated_views_are_refused(head: Head, seen: StereoFrame) -> None:
     assert not any(answer.status == EyeRotation.STATUS_OK for answer in head.answers)
 
 
-def test_without_camera_info_nothing_is_told(head: Head, seen: StereoFrame) -> None:
+def test_without_camera_info_the_message_has_no_angles(head: Head, seen: StereoFrame) -> None:
     assert is_silent(head.until(EyeRotation.STATUS_NO_CAMERA_INFO, seen.left, seen.right, described=False))
 
 
 def test_what_the_servos_cannot_be_is_contradictory_and_a_diagnostic(graph: Any, seen: StereoFrame) -> None:
-    head = Head(graph, mount_tolerance_rad=0.001)
+    head = Head(graph, **{"acceptance.mount_tolerance_rad": 0.001})
     head.said_rad["pan_right"] -= 0.018
     message = head.until(EyeRotation.STATUS_CONTRADICTORY, seen.left, seen.right)
     assert "servos and mounts allow" in message.reason

@@ -80,13 +80,29 @@ def test_starts_with_the_shipped_yaml_and_ends_cleanly(domain_id: int, number: s
             "/**: {ros__parameters: {edges: {blur_sigma_px: -1.0}}}",
             "parameter 'edges.blur_sigma_px' must be a number",
         ),
-        ("/**: {ros__parameters: {edges: {windows_px: [50, 0]}}}", "parameter 'windows_px' is"),
-        ("/**: {ros__parameters: {edges: {canny_low: 90.0}}}", "parameter 'edges.canny_low' must be at most canny_high"),
+        ("/**: {ros__parameters: {edges: {windows_px: [50, 0]}}}", "parameter 'edges.windows_px' must be a list"),
+        (
+            "/**: {ros__parameters: {edges: {canny_low: 90.0}}}",
+            "parameter 'edges.canny_low' must be at most canny_high",
+        ),
         ("/**: {ros__parameters: {windows: [50]}}", "there is no parameter 'windows': its name must be one of "),
+        (
+            "/**: {ros__parameters: {track_saccade_deg: 2.0}}",
+            "parameter 'track_saccade_deg' was renamed: set 'tracker.saccade_rad' (in rad) instead",
+        ),
         ("/**: {ros__parameters: {rig: /nowhere/rig.yaml}}", "/nowhere/rig.yaml"),
         ("{ not: [yaml", "Couldn't parse params file"),
     ],
-    ids=["mistyped", "out_of_range", "out_of_range_in_a_list", "contradicting", "unknown", "no_rig", "not_yaml"],
+    ids=[
+        "mistyped",
+        "out_of_range",
+        "out_of_range_in_a_list",
+        "contradicting",
+        "unknown",
+        "renamed",
+        "no_rig",
+        "not_yaml",
+    ],
 )
 def test_a_bad_yaml_ends_with_status_2_and_one_line(tmp_path: Path, domain_id: int, yaml: str, complaint: str) -> None:
     path = tmp_path / "bad.yaml"
