@@ -143,7 +143,7 @@ def end(process: "subprocess.Popen[str]", number: int = signal.SIGINT) -> str:
 def test_one_eye_reconnects_and_reconnects_while_the_other_never_waits(
     start: Start, listener: Node, faulty: FaultyCamera, recording: Path
 ) -> None:
-    left = start("left", faulty.url, stall_timeout_s=STALL_S, first_retry_s=0.05, last_retry_s=0.2)
+    left = start("left", faulty.url, stall_timeout_s=STALL_S, **{"retry.first_s": 0.05, "retry.longest_s": 0.2})
     right = start("right", str(recording))
     stamps: dict[str, list[int]] = {"left": [], "right": []}
     counts: dict[str, str] = {}
@@ -195,11 +195,11 @@ def test_a_recording_played_once_is_seen_to_its_end_and_ends_well(
 
     listener.create_subscription(CompressedImage, "/left/image_raw/compressed", receive, IMAGE_QOS)
     # Slow, so that discovery is over long before the last frame.
-    process = start("left", str(recording), replay_loop=False, replay_rate_hz=3.0)
+    process = start("left", str(recording), **{"replay.loop": False, "replay.rate_hz": 3.0})
     spin(listener, last_came)
     _, errors = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 0, errors
-    assert "played to its end" in errors
+    assert "recording has ended" in errors
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import pytest
 
-from vergence_camera.capture_loop import CaptureLoop, Patience
+from vergence_camera.capture_loop import CaptureLoop, RetryPolicy
+from vergence_camera.capture_statistics import CaptureStatistics
 from vergence_camera.errors import (
     CameraError,
     CorruptFrameError,
@@ -18,12 +19,11 @@ from vergence_camera.errors import (
     UsbBandwidthError,
 )
 from vergence_camera.frame import Clock, Encoding, Frame, Mode
-from vergence_camera.health import Health
 from vergence_camera.stamps import Stamp, Stamper
 
 MODE = Mode("MJPG", 640, 480, 30.0)
 # Where this machine pauses, that is neither a stall nor an old frame.
-PATIENT = Patience(stall_s=60.0, max_age_s=60.0, first_retry_s=0.005, last_retry_s=0.02)
+PATIENT = RetryPolicy(stall_s=60.0, max_age_s=60.0, first_s=0.005, longest_s=0.02)
 
 
 class ScriptedSource:
@@ -64,18 +64,18 @@ class ScriptedSource:
 class Bench:
     """A loop around a scripted source, with what it delivered."""
 
-    def __init__(self, source: ScriptedSource, patience: Patience = PATIENT) -> None:
-        self.source, self.health = source, Health()
+    def __init__(self, source: ScriptedSource, retry_policy: RetryPolicy = PATIENT) -> None:
+        self.source, self.health = source, CaptureStatistics()
         self.delivered = queue.SimpleQueue[int]()
-        self.said: list[tuple[str, bool]] = []
+        self.logged: list[tuple[str, bool]] = []
         self.over = threading.Event()
         self.loop = CaptureLoop(
             source,
             self.deliver,
             Stamper(Clock.WALL.now_ns),
             self.health,
-            patience=patience,
-            say=lambda text, bad: self.said.append((text, bad)),
+            retry_policy=retry_policy,
+            log=lambda text, warning: self.logged.append((text, warning)),
             ended=self.over.set,
         )
 
@@ -97,8 +97,8 @@ class Bench:
 def run() -> Iterator[Callable[..., Bench]]:
     benches: list[Bench] = []
 
-    def make(*opens: Mode | Exception, patience: Patience = PATIENT) -> Bench:
-        benches.append(Bench(ScriptedSource(*opens), patience))
+    def make(*opens: Mode | Exception, retry_policy: RetryPolicy = PATIENT) -> Bench:
+        benches.append(Bench(ScriptedSource(*opens), retry_policy))
         benches[-1].loop.start()
         return benches[-1]
 
@@ -134,11 +134,11 @@ def test_tries_again_until_it_can_be_opened(run: Callable[..., Bench]) -> None:
     bench.source.play(7)
     assert bench.take(1) == [7]
     assert bench.health.snapshot().faults == {"usb_bandwidth": 3}
-    assert [text for text, bad in bench.said if bad] == ["no bandwidth"]
+    assert [text for text, bad in bench.logged if bad] == ["no bandwidth"]
 
 
 def test_a_stall_is_a_fault(run: Callable[..., Bench]) -> None:
-    bench = run(patience=replace(PATIENT, stall_s=0.05))
+    bench = run(retry_policy=replace(PATIENT, stall_s=0.05))
     bench.source.play(0)
     assert bench.take(1) == [0]
     bench.wait_until(lambda: bench.source.opened >= 2, "it is opened again")
@@ -152,11 +152,11 @@ def test_a_corrupt_frame_costs_only_itself(run: Callable[..., Bench]) -> None:
     bench.source.play(0, CorruptFrameError("half"), 2)
     assert bench.take(2) == [0, 2]
     state = bench.health.snapshot()
-    assert (state.corrupt, state.reconnects, state.lost_before_us) == (1, 0, 0)
+    assert (state.corrupt, state.reconnects, state.dropped_by_driver) == (1, 0, 0)
 
 
 def test_a_stream_of_nothing_but_corrupt_frames_is_reopened(run: Callable[..., Bench]) -> None:
-    bench = run(patience=replace(PATIENT, stall_s=0.05))
+    bench = run(retry_policy=replace(PATIENT, stall_s=0.05))
     stop = threading.Event()
 
     def corrupt_for_ever() -> None:
@@ -177,14 +177,14 @@ def test_another_size_after_a_reconnect_is_refused_until_it_is_right_again(run: 
     assert bench.take(2) == [0, 1]
     state = bench.health.snapshot()
     assert state.faults["mode_mismatch"] == 2
-    assert any("320x240" in text and "640x480" in text for text, _ in bench.said)
+    assert any("320x240" in text and "640x480" in text for text, _ in bench.logged)
 
 
 def test_frames_older_than_asked_are_dropped(run: Callable[..., Bench]) -> None:
-    bench = run(patience=replace(PATIENT, stamp_offset_s=1.0, max_age_s=0.5))
+    bench = run(retry_policy=replace(PATIENT, stamp_offset_s=1.0, max_age_s=0.5))
     bench.source.play(0, 1)
     bench.wait_until(lambda: bench.health.snapshot().too_old == 2, "both are dropped")
-    bench.loop.patience = PATIENT
+    bench.loop.retry_policy = PATIENT
     bench.source.play(2)
     assert bench.take(1) == [2]
 

@@ -70,7 +70,7 @@ def test_integer_menus_and_unnamed_values() -> None:
         ("focus_absolute", 7, "steps of 5"),
         ("white_balance_automatic", 1, "true or false"),
         ("power_line_frequency", "55 Hz", "'50 Hz', '60 Hz'"),
-        ("sharpness", 1, "it has brightness"),
+        ("sharpness", 1, "the camera has brightness"),
     ],
 )
 def test_what_is_not_allowed_is_said_and_nothing_is_set(
@@ -116,7 +116,7 @@ def attach(port: ControlPort, kernel: FakeKernel) -> None:
 
 def test_wanted_values_survive_the_unplugging(kernel: FakeKernel, camera: FakeCamera) -> None:
     port = ControlPort()
-    port.want({"brightness": 10})
+    port.set_initial({"brightness": 10})
     attach(port, kernel)
     port.set({"gain": 40})
     port.detach()
@@ -130,14 +130,14 @@ def test_wanted_values_survive_the_unplugging(kernel: FakeKernel, camera: FakeCa
 def test_wrong_wanted_values_fail_the_first_time_and_are_said_later(kernel: FakeKernel) -> None:
     said: list[str] = []
     port = ControlPort(said.append)
-    port.want({"brightness": 1000})
+    port.set_initial({"brightness": 1000})
     with pytest.raises(ControlError, match="1000"):
         attach(port, kernel)
     assert not port.attached
     port = ControlPort(said.append)
     attach(port, kernel)
     port.detach()
-    port.want({"brightness": 1000})
+    port.set_initial({"brightness": 1000})
     attach(port, kernel)
     assert "1000" in said[0]
 
@@ -157,14 +157,14 @@ def test_hold_freezes_what_the_automatic_modes_found(kernel: FakeKernel, camera:
     attach(port, kernel)
     camera.controls[v4l2.CID_EXPOSURE_ABSOLUTE].value = 333
     camera.controls[v4l2.CID_WHITE_BALANCE_TEMPERATURE].value = 5000
-    assert port.hold() == {
+    assert port.follow({}) == {
         "auto_exposure": "Manual Mode",
         "white_balance_automatic": False,
         "exposure_time_absolute": 333,
         "white_balance_temperature": 5000,
         "gain": 16,
     }
-    assert set(port.locked_names()) == set(port.hold())
+    assert set(port.locked_names()) == set(port.follow({}))
 
 
 def test_follow_takes_the_other_eye_over_and_clips_into_its_own_range(kernel: FakeKernel) -> None:
@@ -205,7 +205,7 @@ def test_a_control_that_cannot_be_read_hides_no_other(kernel: FakeKernel, camera
     port = ControlPort()
     attach(port, kernel)
     assert set(port.values()) == set(NAMES) - {"gain"}
-    assert "gain" not in port.hold()
+    assert "gain" not in port.follow({})
     with pytest.raises(ControlError, match="'gain' cannot be read"):
         port.set({"gain": 3})
 

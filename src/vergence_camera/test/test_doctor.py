@@ -94,7 +94,7 @@ def test_a_camera_that_another_process_uses(pair: Pair) -> None:
 def test_silence(pair: Pair) -> None:
     finding = pair.findings(patience_s=0.1)["stream0"]
     assert not finding.ok
-    assert "0 frames came" in finding.message
+    assert "0 frames received" in finding.message
 
 
 def test_permission_and_old_usb(machine: FakeMachine) -> None:

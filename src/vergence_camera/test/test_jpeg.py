@@ -110,7 +110,7 @@ def test_a_damaged_picture_is_judged_alike_whether_its_header_was_seen_before_or
         except CorruptFrameError as error:
             return str(error)
 
-    jpeg._known_heads.clear()
+    jpeg._headers_by_bytes.clear()
     fresh = verdict()
     inspect_jpeg(whole)
     assert verdict() == fresh

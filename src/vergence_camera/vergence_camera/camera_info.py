@@ -1,4 +1,4 @@
-"""A camera's calibration in the standard YAML of the ROS calibrators, and where its URL leads."""
+"""A camera's calibration in the standard YAML of the ROS calibrators, and the path of a camera_info URL."""
 
 import math
 import os
@@ -17,7 +17,7 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class CameraCalibrationError(ValueError):
-    """A calibration that cannot be: names the file, the entry, its value and what is allowed."""
+    """An invalid calibration: the message names the file, the entry, what it must be, and its value."""
 
 
 @dataclass(frozen=True)
@@ -38,19 +38,19 @@ class Calibration:
         for entry, length in (("camera_matrix", 9), ("rectification_matrix", 9), ("projection_matrix", 12)):
             values = {"camera_matrix": self.k, "rectification_matrix": self.r, "projection_matrix": self.p}[entry]
             if len(values) != length or not all(math.isfinite(value) for value in values):
-                raise CameraCalibrationError(f"{entry} is {list(values)}: allowed are {length} finite numbers")
+                raise CameraCalibrationError(f"{entry} must be {length} finite numbers: got {list(values)}")
         if self.width_px < 1 or self.height_px < 1:
-            raise CameraCalibrationError(f"image size is {self.width_px}x{self.height_px}: allowed is at least 1x1")
+            raise CameraCalibrationError(f"image size must be at least 1x1: got {self.width_px}x{self.height_px}")
         if not (self.k[0] > 0.0 and self.k[4] > 0.0):
-            raise CameraCalibrationError(f"focal lengths are {self.k[0]:g}, {self.k[4]:g}: allowed is above 0")
+            raise CameraCalibrationError(f"focal lengths must be above 0: got {self.k[0]:g}, {self.k[4]:g}")
         lengths = DISTORTION_LENGTHS.get(self.distortion_model)
         if lengths is None:
             known = ", ".join(DISTORTION_LENGTHS)
-            raise CameraCalibrationError(f"distortion_model is {self.distortion_model!r}: allowed is one of {known}")
+            raise CameraCalibrationError(f"distortion_model must be one of {known}: got {self.distortion_model!r}")
         if len(self.d) not in lengths or not all(math.isfinite(value) for value in self.d):
             allowed = " or ".join(map(str, lengths))
             raise CameraCalibrationError(
-                f"distortion_coefficients is {list(self.d)}: allowed are {allowed} finite numbers"
+                f"distortion_coefficients must be {allowed} finite numbers: got {list(self.d)}"
             )
 
     def _monocular_projection(self) -> tuple[float, ...]:
@@ -91,11 +91,11 @@ def write_yaml(document: dict[str, Any], path: Path) -> None:
 
 
 def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -> Path:
-    """Return the file that a camera_info URL means.
+    """Return the path of a camera_info URL.
 
     Args:
-        url: `file:///...` or `package://PACKAGE/...`; `${NAME}` and `${ROS_HOME}` are filled in. Empty is the place
-            that ROS's camera drivers share, `${ROS_HOME}/camera_info/${NAME}.yaml`.
+        url: `file:///...` or `package://PACKAGE/...`; `${NAME}` and `${ROS_HOME}` are replaced. Empty means the default
+            of ROS's camera drivers, `${ROS_HOME}/camera_info/${NAME}.yaml`.
         name: the camera's name.
         package_share: gives the share directory of a package; raises LookupError for an unknown one.
 
@@ -112,8 +112,8 @@ def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -
         try:
             return Path(package_share(parts.netloc)) / unquote(parts.path).lstrip("/")
         except LookupError as error:
-            raise CameraCalibrationError(f"camera_info_url is '{url}': there is no package '{parts.netloc}'") from error
-    raise CameraCalibrationError(f"camera_info_url is '{url}': allowed is file:///PATH or package://PACKAGE/PATH")
+            raise CameraCalibrationError(f"camera_info_url must name an installed package: got '{url}'") from error
+    raise CameraCalibrationError(f"camera_info_url must be file:///PATH or package://PACKAGE/PATH: got '{url}'")
 
 
 def _matrix(rows: int, columns: int, data: Sequence[float]) -> dict[str, Any]:
@@ -122,7 +122,7 @@ def _matrix(rows: int, columns: int, data: Sequence[float]) -> dict[str, Any]:
 
 def _from_document(document: Any) -> Calibration:
     if not isinstance(document, dict):
-        raise CameraCalibrationError("is no mapping of image_width, camera_matrix, ...")
+        raise CameraCalibrationError("the file must be a mapping of image_width, camera_matrix, ...")
     k = _numbers(document, "camera_matrix")
     return Calibration(
         width_px=_whole(document, "image_width"),
@@ -139,7 +139,7 @@ def _from_document(document: Any) -> Calibration:
 def _whole(document: dict[str, Any], entry: str) -> int:
     value = document.get(entry)
     if not isinstance(value, int) or isinstance(value, bool):
-        raise CameraCalibrationError(f"{entry} is {value!r}: allowed is a whole number")
+        raise CameraCalibrationError(f"{entry} must be a whole number: got {value!r}")
     return value
 
 
@@ -147,5 +147,5 @@ def _numbers(document: dict[str, Any], entry: str) -> tuple[float, ...]:
     value = document.get(entry)
     data = value.get("data") if isinstance(value, dict) else None
     if not isinstance(data, list) or not all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in data):
-        raise CameraCalibrationError(f"{entry} is {value!r}: allowed is a mapping with a list of numbers under 'data'")
+        raise CameraCalibrationError(f"{entry} must be a mapping with a list of numbers under 'data': got {value!r}")
     return tuple(float(x) for x in data)

@@ -1,4 +1,4 @@
-"""The controls of a camera that comes and goes: wanted values outlive the connection."""
+"""The controls of a camera that may be reconnected: values that were set are set again afterwards."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -19,32 +19,32 @@ _LOCKED = (v4l2.CID_EXPOSURE_ABSOLUTE, v4l2.CID_GAIN, v4l2.CID_WHITE_BALANCE_TEM
 
 
 class ControlPort:
-    """Where the node reaches the controls. It is the DeviceUser of the source: safe to use from any thread.
+    """Reads and sets the controls; safe to use from any thread. It is the DeviceUser of the source.
 
-    `say` gets a line for each wanted value that the camera refuses when it comes back.
+    `log` gets a line for each stored value that the camera refuses after a reconnect.
     """
 
-    def __init__(self, say: Callable[[str], None] = lambda text: None) -> None:
-        self._say = say
+    def __init__(self, log: Callable[[str], None] = lambda text: None) -> None:
+        self._log = log
         self._lock = threading.RLock()
         self._controls: Controls | None = None
         self._specs: dict[str, ControlSpec] = {}
-        self._wanted: dict[str, object] = {}
+        self._stored: dict[str, object] = {}
         self.generation = 0
 
     def attach(self, kernel: Kernel, descriptor: int, path: str) -> None:
-        """See DeviceUser: the wanted values are set again, since a camera forgets them when it is unplugged."""
+        """See DeviceUser: the stored values are set again, since a camera loses them when it is unplugged."""
         with self._lock:
             self._controls = Controls(kernel, descriptor, path)
             self._specs = self._controls.specs()
             try:
-                if self._wanted:
-                    self._controls.apply(self._wanted)
+                if self._stored:
+                    self._controls.apply(self._stored)
             except ControlError as error:
                 if self.generation == 0:
                     self._controls = None
                     raise
-                self._say(str(error))
+                self._log(str(error))
             self.generation += 1
 
     def detach(self) -> None:
@@ -58,50 +58,43 @@ class ControlPort:
         with self._lock:
             return self._controls is not None
 
-    def want(self, values: Mapping[str, object]) -> None:
-        """Set `values` whenever the camera comes; used before the first connection."""
+    def set_initial(self, values: Mapping[str, object]) -> None:
+        """Set `values` at every connection; called before the first."""
         with self._lock:
-            self._wanted.update(values)
+            self._stored.update(values)
 
     def specs(self) -> dict[str, ControlSpec]:
-        """Return the controls of the camera that was last seen; empty before the first."""
+        """Return the controls of the camera that was last connected; empty before the first."""
         with self._lock:
             return dict(self._specs)
 
     def values(self) -> dict[str, Value]:
-        """Return the camera's present values; empty while it is away."""
+        """Return the camera's present values; empty while it is not connected."""
         with self._lock:
             try:
                 return self._controls.values() if self._controls is not None else {}
-            except CameraError:  # it is just being unplugged; the capture thread says so
+            except CameraError:  # it is just being unplugged; the capture thread reports that
                 return {}
 
     def set(self, changes: Mapping[str, object]) -> dict[str, Value]:
-        """Set all of `changes` or none (see Controls.apply) and want them from now on."""
+        """Set all of `changes` or none (see Controls.apply), and again at every later connection."""
         with self._lock:
             result = self._present().apply(changes)
-            self._wanted.update(changes)
+            self._stored.update(changes)
             return result
 
-    def hold(self) -> dict[str, Value]:
-        """Switch the automatic modes off and keep exposure, gain and white balance where they are now.
-
-        Returns the controls that were set, and their values.
-        """
-        return self.follow({})
-
     def follow(self, leader: Mapping[str, object]) -> dict[str, Value]:
-        """Switch the automatic modes off and take exposure, gain and white balance over from the other eye.
+        """Switch the automatic modes off and copy exposure, gain and white balance from the other eye.
 
         Args:
             leader: control values by name; those that this camera lacks are left out, numbers beyond its range are
-                clipped into it. A locked control that is missing keeps its present value.
+                clipped to it. A control that is missing keeps its present value, so that {} fixes them all.
 
         Returns:
             The controls that were set, and their values.
 
         Raises:
-            ControlError: an automatic mode of the leader is still on, so that its values mean nothing yet.
+            ControlError: an automatic mode of the leader is still on, so that its values are not final.
         """
         with self._lock:
             controls = self._present()

@@ -13,7 +13,7 @@ from vergence_camera.v4l2.kernel import Kernel
 
 @dataclass(frozen=True)
 class SystemTree:
-    """Where sysfs and the device nodes are; tests give a tree of their own."""
+    """The roots of sysfs and of the device nodes; tests use their own."""
 
     sys: Path = Path("/sys")
     dev: Path = Path("/dev")
@@ -51,7 +51,7 @@ class Device:
 
 @dataclass(frozen=True)
 class ListedDevice:
-    """A device with what it offers, or why it could not be asked."""
+    """A device with its modes, or why they could not be read."""
 
     device: Device
     sizes: Sequence[OfferedSize] = ()
@@ -128,14 +128,14 @@ def choose(text: str, devices: Sequence[Device]) -> Device:
     }
     if rule in tests:
         if not rest:
-            raise ChoiceError(f"camera '{text}': what comes after '{rule}:' is missing")
+            raise ChoiceError(f"camera '{text}': a value must follow '{rule}:'")
         found = [device for device in devices if tests[rule](device)]
     elif re.fullmatch(r"\d{1,3}", text):
         found = [device for device in devices if device.number == int(text)]
     else:
         found = [device for device in devices if text in device.names]
     if not found:
-        raise CameraNotFoundError(f"camera '{text}' is not there; {_candidates(devices)}")
+        raise CameraNotFoundError(f"camera '{text}' is not plugged in; {_candidates(devices)}")
     if len(found) > 1:
         raise AmbiguousCameraError(
             f"camera '{text}' may be {len(found)} cameras: choose by a by-path name; {_candidates(found)}"
@@ -145,10 +145,9 @@ def choose(text: str, devices: Sequence[Device]) -> Device:
 
 @dataclass
 class PinnedChoice:
-    """A choice that stays with the camera it first found, wherever that is plugged in later.
+    """A choice that keeps to the camera it first found, also when that is plugged in elsewhere.
 
-    A camera with a serial of its own is known again in any port. One without, or whose serial another has as well, is
-    known by its port.
+    A camera with a unique serial is recognised in any port; others are recognised by their port.
     """
 
     text: str
@@ -166,17 +165,17 @@ class PinnedChoice:
             return self.device.path
         if self.device.number < 0 and os.path.exists(self.device.path):
             return self.device.path
-        known = [device for device in devices if self._is_it(device)]
-        if not known:
-            raise CameraNotFoundError(f"camera {self.device} is gone; {_candidates(devices)}")
-        self.device = known[0]
+        present = [device for device in devices if self._is_it(device)]
+        if not present:
+            raise CameraNotFoundError(f"camera {self.device} was unplugged; {_candidates(devices)}")
+        self.device = present[0]
         return self.device.path
 
     def _choose(self, devices: Sequence[Device]) -> Device:
         try:
             return choose(self.text, devices)
         except CameraNotFoundError:
-            # A device node that sysfs does not list, as in a container: it has only its path to be known by.
+            # A device node that sysfs does not list, as in a container: only its path identifies it.
             if self.text.startswith("/dev/") and os.path.exists(self.text):
                 return Device(path=self.text, number=-1, name=self.text)
             raise

@@ -11,7 +11,7 @@ from vergence_camera.control_port import ControlPort
 from vergence_camera.devices import ListedDevice, SystemTree, list_devices
 from vergence_camera.errors import CameraError, CorruptFrameError, DeviceBusyError
 from vergence_camera.frame import Clock, Frame, ModeRequest
-from vergence_camera.pair import Eye, SkewMeter, faults_of_pair
+from vergence_camera.pair import EyeCamera, SkewMeter, faults_of_pair
 from vergence_camera.v4l2.capture import V4l2Source
 from vergence_camera.v4l2.faults import camera_error
 from vergence_camera.v4l2.kernel import Kernel, LinuxKernel
@@ -54,12 +54,12 @@ def check(
         kernel, tree: replace the machine's own in tests.
         trial_s: length of the trial by the frames' own times; 0 leaves it out.
         patience_s: the trial of a camera that gives fewer frames ends after this time.
-        max_skew_s: largest time apart that the pairer accepts.
+        max_skew_s: largest time between two frames that are paired.
     """
     kernel = kernel or LinuxKernel()
     listed = list_devices(kernel, tree)
     if not listed:
-        return [Finding("cameras", False, "none is plugged in", "plug two in; recordings and URLs work without")]
+        return [Finding("cameras", False, "no camera is plugged in", "plug two in; recordings and URLs work without")]
     findings = [Finding("cameras", True, "; ".join(str(entry.device) for entry in listed))]
     for entry in listed:
         findings += _check_device(entry)
@@ -83,15 +83,15 @@ def _check_device(entry: ListedDevice) -> list[Finding]:
     findings = []
     formats = {size.pixel_format for size in entry.sizes}
     if "MJPG" not in formats:
-        has = ", ".join(sorted(formats)) or "no format that it lists"
+        has = ", ".join(sorted(formats)) or "no listed format"
         findings.append(
-            Finding(name, False, f"has no MJPG, but {has}", "set pixel_format: YUYV; it takes ten times the bandwidth")
+            Finding(name, False, f"no MJPG, only {has}", "set pixel_format: YUYV; it needs ten times the bandwidth")
         )
     if device.speed_mbps and float(device.speed_mbps) < _HIGH_SPEED_MBPS:
         text = f"runs at {device.speed_mbps} Mbit/s, USB 1"
         findings.append(Finding(name, False, text, "use another port, cable or hub"))
     if not device.by_id:
-        text = "has no by-id name: its number changes with the order of plugging in"
+        text = "no by-id name: its number changes with the order of plugging in"
         findings.append(Finding(name, False, text, "choose it by its by-path name or by port:" + device.usb_port))
     return findings
 
@@ -99,11 +99,11 @@ def _check_device(entry: ListedDevice) -> list[Finding]:
 def _check_trial(entry: ListedDevice, trial: _Trial) -> Finding:
     name = f"stream {entry.device.path}"
     if isinstance(trial.error, DeviceBusyError):
-        return Finding(name, True, f"{trial.error} (the trial is left out; see /diagnostics of its node)")
+        return Finding(name, True, f"{trial.error} (trial skipped; see /diagnostics of its node)")
     if trial.error is not None:
         return Finding(name, False, str(trial.error), "see there")
     if len(trial.stamps_ns) < 2:
-        return Finding(name, False, f"{len(trial.stamps_ns)} frames came", "plug it in anew, without a hub")
+        return Finding(name, False, f"{len(trial.stamps_ns)} frames received", "plug it in again, without a hub")
     text = f"{_TRIAL_MODE}: {trial.rate_hz:.1f} Hz, {len(trial.stamps_ns)} frames, {trial.corrupt} damaged"
     slow = trial.rate_hz < 0.9 * _TRIAL_MODE.rate_hz
     return Finding(name, not slow and not trial.corrupt, text, "more light, or a fixed exposure; a better cable")
@@ -111,14 +111,14 @@ def _check_trial(entry: ListedDevice, trial: _Trial) -> Finding:
 
 def _check_pair(pair: Sequence[ListedDevice], trials: Sequence[_Trial], max_skew_s: float) -> Finding:
     eyes = [
-        Eye(entry.device.path, entry.device.controller, trial.rate_hz, trial.controls)
+        EyeCamera(entry.device.path, entry.device.controller, trial.rate_hz, trial.controls)
         for entry, trial in zip(pair, trials, strict=True)
     ]
     meter = SkewMeter()
     for stamp_ns in trials[0].stamps_ns:
-        meter.own(stamp_ns)
+        meter.add_own(stamp_ns)
     for stamp_ns in trials[1].stamps_ns:
-        meter.other(stamp_ns)
+        meter.add_other(stamp_ns)
     faults = faults_of_pair(eyes[0], eyes[1], meter.skew_s(), max_skew_s)
     name = f"pair {eyes[0].name}, {eyes[1].name}"
     if faults:

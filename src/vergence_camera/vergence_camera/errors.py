@@ -1,8 +1,8 @@
-"""One exception per way in which a camera fails; each says what failed and what mends it."""
+"""One exception per failure of a camera; each message says what failed and how to solve it."""
 
 
 class CameraError(OSError):
-    """A camera that does not give what was asked. `permanent`: waiting will not mend it, the user has to."""
+    """A failure of a camera. `permanent`: retrying cannot help, the user has to change something."""
 
     permanent = False
 
@@ -24,7 +24,7 @@ class CameraNotFoundError(CameraError):
 
 
 class AmbiguousCameraError(CameraError, ValueError):
-    """Several cameras answer to that name; the message lists them."""
+    """Several cameras have that name; the message lists them."""
 
     permanent = True
 
@@ -36,7 +36,7 @@ class FileMissingError(CameraError, ValueError):
 
 
 class ModeMismatchError(CameraError, ValueError):
-    """The camera's size or pixel format is not the one asked for; the message names both."""
+    """The camera's size or pixel format is not the requested one; the message names both."""
 
     permanent = True
 
@@ -64,7 +64,7 @@ class UnpluggedError(CameraError):
 
 
 class StalledError(CameraError):
-    """The device or stream is open, but no frame came for too long."""
+    """The device or stream is open, but sent no frame for too long."""
 
 
 class DisconnectedError(CameraError):
@@ -84,10 +84,10 @@ class WrongSizeError(CorruptFrameError):
 
 
 class ReplayEndedError(CameraError):
-    """The file or folder has been played to its end, once, as asked."""
+    """The file or folder has been played once, as requested."""
 
 
 class ControlError(CameraError, ValueError):
-    """A control that cannot take that value; the message says what is allowed."""
+    """An invalid value of a control; the message says what it must be."""
 
     permanent = True

@@ -1,4 +1,4 @@
-"""What a source hands over: the bytes as they came, and when they were captured on which clock."""
+"""What a source delivers: the unchanged bytes of a frame, its capture time and the clock of that time."""
 
 import time
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Frame(NamedTuple):
 
     `data` is the camera's own bytes for JPEG and YUYV, and uint8 pixels (h, w, 3) or (h, w) for BGR and GREY.
     `time_ns` is the capture time on `clock`. `sequence` counts the source's frames: a step of more than one means that
-    frames were lost before they reached this process. `skipped` older frames were thrown away in favour of this one.
+    frames were lost before they reached this process. `skipped` older frames were dropped for this newer one.
     """
 
     data: bytes | Pixels
@@ -64,7 +64,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class ModeRequest:
-    """What was asked for; zero or an empty text leaves that to the source."""
+    """The requested mode; zero or an empty text accepts any."""
 
     pixel_format: str = ""
     width_px: int = 0
@@ -77,7 +77,7 @@ class ModeRequest:
         return f"{self.pixel_format or 'any format'} {size} at {rate}"
 
     def hard_mismatch(self, actual: Mode) -> bool:
-        """True if size or pixel format are not as asked: nothing downstream would be right."""
+        """True if size or pixel format differ from the request: an error."""
         return (
             (self.pixel_format not in ("", actual.pixel_format))
             or (self.width_px not in (0, actual.width_px))
@@ -85,7 +85,7 @@ class ModeRequest:
         )
 
     def soft_mismatch(self, actual: Mode) -> bool:
-        """True if only the rate differs by more than 2 %: worth a warning."""
+        """True if the rate differs by more than 2 %: a warning."""
         if not self.rate_hz or not actual.rate_hz:
             return False
         return abs(actual.rate_hz - self.rate_hz) > 0.02 * self.rate_hz

@@ -12,7 +12,7 @@ _START_OF_SCAN = 0xDA
 _MARKER_IN_SCAN = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")
 _SCAN = b"\xff\xda"
 _Header: TypeAlias = tuple[int, tuple[int, int, int]]
-_known_heads: dict[bytes, _Header] = {}
+_headers_by_bytes: dict[bytes, _Header] = {}
 _MOST_HEADS = 64
 _BETWEEN_SCANS = frozenset({0xC4, 0xDA, 0xDB, 0xDC, 0xDD, 0xFE})
 
@@ -42,10 +42,10 @@ def inspect_jpeg(data: bytes, *, must_be_whole: bool = True) -> JpegInfo:
     if not data.startswith(_START):
         raise CorruptFrameError(f"frame of {len(data)} bytes does not begin like a JPEG (ff d8): {data[:4].hex(' ')}")
     head = data[: data.find(_SCAN, 2) + 4]
-    known = _known_heads.get(head)
-    if known is None or known[0] > len(data):
-        known = _read_header(data, head)
-    position, size = known
+    cached = _headers_by_bytes.get(head)
+    if cached is None or cached[0] > len(data):
+        cached = _read_header(data, head)
+    position, size = cached
     end = _end_of_scans(data, position)
     if end < 0:
         if must_be_whole:
@@ -57,7 +57,7 @@ def inspect_jpeg(data: bytes, *, must_be_whole: bool = True) -> JpegInfo:
 def _read_header(data: bytes, head: bytes) -> _Header:
     """Return where the coded data begins, and width, height and components.
 
-    Cameras send few different headers, often one: they are remembered by their bytes up to the scan's marker.
+    Cameras send few different headers, often one: they are cached by their bytes up to the scan's marker.
     """
     begin, size = 2, None
     while True:
@@ -72,9 +72,9 @@ def _read_header(data: bytes, head: bytes) -> _Header:
     if size is None or 0 in size:
         raise CorruptFrameError("JPEG has no size before its first scan")
     if begin + 4 == len(head):
-        if len(_known_heads) >= _MOST_HEADS:
-            _known_heads.clear()
-        _known_heads[head] = (position, size)
+        if len(_headers_by_bytes) >= _MOST_HEADS:
+            _headers_by_bytes.clear()
+        _headers_by_bytes[head] = (position, size)
     return position, size
 
 

@@ -1,4 +1,4 @@
-"""What keeps two good cameras from being a good pair."""
+"""Checks of two cameras as a pair: USB controllers, rates, controls, and the time between their frames."""
 
 import bisect
 import math
@@ -11,8 +11,8 @@ _WINDOW = 60
 
 
 @dataclass(frozen=True)
-class Eye:
-    """What is known of one camera; empty or NaN where it is not. `controls` are the values that both should share."""
+class EyeCamera:
+    """One camera of the pair; empty or NaN where a value is missing. `controls` must be equal in both cameras."""
 
     name: str
     controller: str = ""
@@ -20,13 +20,13 @@ class Eye:
     controls: Mapping[str, object] = field(default_factory=dict)
 
 
-def faults_of_pair(left: Eye, right: Eye, skew_s: float, max_skew_s: float) -> list[str]:
-    """Return a sentence, with what mends it, for everything that is wrong with the pair."""
+def faults_of_pair(left: EyeCamera, right: EyeCamera, skew_s: float, max_skew_s: float) -> list[str]:
+    """Return a sentence "problem: remedy" for each fault of the pair."""
     faults = []
     if left.controller and left.controller == right.controller:
         faults.append(
             f"{left.name} and {right.name} share USB controller {left.controller}: plug one into a port of another "
-            "one if frames are lost or the second does not start"
+            "controller if frames are lost or the second does not start"
         )
     rates = (left.rate_hz, right.rate_hz)
     if all(math.isfinite(rate) for rate in rates) and max(rates) > 1.05 * min(rates):
@@ -37,14 +37,14 @@ def faults_of_pair(left: Eye, right: Eye, skew_s: float, max_skew_s: float) -> l
     differing = [
         f"{name} {left.controls[name]} and {right.controls[name]}"
         for name in left.controls
-        if name in right.controls and not _alike(left.controls[name], right.controls[name])
+        if name in right.controls and not _equal_enough(left.controls[name], right.controls[name])
     ]
     if differing:
-        faults.append(f"the two differ in {', '.join(differing)}: set lock 'hold' on one and 'follow' on the other")
+        faults.append(f"the cameras differ in {', '.join(differing)}: set lock 'hold' on one and 'follow' on the other")
     if math.isfinite(skew_s) and abs(skew_s) > max_skew_s:
         faults.append(
-            f"the two are {abs(skew_s) * 1e3:.1f} ms apart, {max_skew_s * 1e3:.1f} ms are accepted: restart one, or "
-            "use a higher rate, or measure stamp_offset_s"
+            f"the cameras are {abs(skew_s) * 1e3:.1f} ms apart, at most {max_skew_s * 1e3:.1f} ms are paired: restart "
+            "one, use a higher rate, or measure stamp_offset_s"
         )
     return faults
 
@@ -56,16 +56,16 @@ class SkewMeter:
         self._own: deque[int] = deque(maxlen=_WINDOW)
         self._other: deque[int] = deque(maxlen=_WINDOW)
 
-    def own(self, stamp_ns: int) -> None:
-        """Note a stamp of this eye, in order."""
+    def add_own(self, stamp_ns: int) -> None:
+        """Add a stamp of this eye, in order."""
         self._own.append(stamp_ns)
 
-    def other(self, stamp_ns: int) -> None:
-        """Note a stamp of the other eye, in order."""
+    def add_other(self, stamp_ns: int) -> None:
+        """Add a stamp of the other eye, in order."""
         self._other.append(stamp_ns)
 
     def skew_s(self) -> float:
-        """Return the median of own minus nearest other; NaN until both have been seen for the same time."""
+        """Return the median of own minus nearest other; NaN until the stamps of both overlap."""
         own, other = list(self._own), list(self._other)
         common = [stamp for stamp in own if other and other[0] <= stamp <= other[-1]]
         if not common:
@@ -73,7 +73,7 @@ class SkewMeter:
         return statistics.median(stamp - _nearest(other, stamp) for stamp in common) * 1e-9
 
     def other_rate_hz(self) -> float:
-        """Return the other eye's rate by its stamps; NaN until it is known."""
+        """Return the other eye's rate by its stamps; NaN before the second stamp."""
         other = list(self._other)
         span = other[-1] - other[0] if len(other) > 1 else 0
         return (len(other) - 1) * 1e9 / span if span > 0 else math.nan
@@ -84,7 +84,7 @@ def _nearest(ordered: list[int], value: int) -> int:
     return min(ordered[max(0, right - 1) : right + 1], key=lambda candidate: abs(candidate - value))
 
 
-def _alike(one: object, other: object) -> bool:
+def _equal_enough(one: object, other: object) -> bool:
     if isinstance(one, int) and isinstance(other, int) and not isinstance(one, bool):
         return abs(one - other) <= 0.02 * max(abs(one), abs(other))
     return one == other

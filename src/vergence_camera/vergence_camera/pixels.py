@@ -1,4 +1,4 @@
-"""From a frame as it came to pixels, and to JPEG, for those who listen to that."""
+"""Decodes a frame to pixels, and encodes pixels as JPEG."""
 
 import cv2
 import numpy as np

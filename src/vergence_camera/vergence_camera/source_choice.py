@@ -1,8 +1,8 @@
-"""From the text that chooses a camera to the source that reads it."""
+"""From the text that chooses a camera to the source that reads it. `register_url_scheme` adds a kind of source."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -17,46 +17,6 @@ from vergence_camera.v4l2.capture import DeviceUser, V4l2Source
 from vergence_camera.v4l2.kernel import Kernel, LinuxKernel
 
 _VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".webm", ".ts", ".mpg", ".h264", ".264", ".m3u8", ".mjpg")
-_STREAM_SCHEMES = ("rtsp", "rtsps", "rtmp", "udp", "tcp", "srt")
-ALLOWED_DEVICES = "a camera, a video file, a folder of pictures or a URL (file, http, https, {} or {})".format(
-    ", ".join(_STREAM_SCHEMES[:-1]), _STREAM_SCHEMES[-1]
-)
-"""What a camera's choice must be, for messages."""
-
-
-class Kind(Enum):
-    """What a choice names."""
-
-    DEVICE = "camera"
-    RECORDING = "recording"
-    HTTP_JPEG = "HTTP stream of JPEGs"
-    DECODED_STREAM = "network stream"
-
-
-def kind_of(text: str) -> Kind:
-    """Return what `text` names, without looking whether it is there; raise ChoiceError if it can be nothing."""
-    if not text.strip():
-        raise ChoiceError(f"device must be {ALLOWED_DEVICES}: got an empty text")
-    scheme, separator, _ = text.partition("://")
-    if separator:
-        return _kind_of_url(text, scheme.lower())
-    if text.startswith("/dev/") or re.fullmatch(r"(serial|port|number):.*|\d{1,3}", text):
-        return Kind.DEVICE
-    path = Path(text).expanduser()
-    if path.exists() or "/" in text or path.suffix.lower() in _VIDEO_SUFFIXES:
-        return Kind.RECORDING
-    return Kind.DEVICE
-
-
-def _kind_of_url(text: str, scheme: str) -> Kind:
-    if scheme == "file":
-        return Kind.RECORDING
-    if scheme in ("http", "https"):
-        is_video = urlsplit(text).path.lower().endswith(_VIDEO_SUFFIXES) and not text.lower().endswith(".mjpg")
-        return Kind.DECODED_STREAM if is_video else Kind.HTTP_JPEG
-    if scheme in _STREAM_SCHEMES:
-        return Kind.DECODED_STREAM
-    raise ChoiceError(f"device must be {ALLOWED_DEVICES}: got '{text}', whose scheme is '{scheme}'")
 
 
 @dataclass(frozen=True)
@@ -72,6 +32,33 @@ class SourceOptions:
     buffers: int = 4
 
 
+UrlBuilder = Callable[[str, SourceOptions], FrameSource]
+"""Returns the source of a URL, not opened yet."""
+
+_URL_BUILDERS: dict[str, UrlBuilder] = {}
+
+
+def register_url_scheme(scheme: str, build: UrlBuilder) -> None:
+    """Let `device` be a URL of another scheme; raises ValueError for one in use."""
+    if scheme in _URL_BUILDERS:
+        raise ValueError(f"the URL scheme of a camera source must be new: got {scheme!r}, which is registered")
+    _URL_BUILDERS[scheme] = build
+
+
+def allowed_devices() -> str:
+    """Return what a camera's choice must be, for messages."""
+    return f"a camera, a video file, a folder of pictures or a URL ({', '.join(_URL_BUILDERS)})"
+
+
+def check_choice(text: str) -> None:
+    """Raise ChoiceError if `text` can name no camera, file or URL; whether it is there is not checked."""
+    if not text.strip():
+        raise ChoiceError(f"device must be {allowed_devices()}: got an empty text")
+    scheme = _scheme(text)
+    if scheme and scheme not in _URL_BUILDERS:
+        raise ChoiceError(f"device must be {allowed_devices()}: got '{text}', whose scheme is '{scheme}'")
+
+
 def make_source(
     text: str,
     options: SourceOptions,
@@ -82,23 +69,14 @@ def make_source(
 ) -> FrameSource:
     """Return the source that `text` names, not opened yet; raise CameraError if it can be none.
 
-    `kernel` and `tree` replace the machine's own in tests; `user` is told when a device opens and closes.
+    `kernel` and `tree` replace the machine's own in tests; `user` is called when a device opens and closes.
     """
-    kind = kind_of(text)
-    if kind is Kind.RECORDING:
-        path = Path(unquote(urlsplit(text).path) if "://" in text else text).expanduser()
-        return Replay(open_recording(path), options.request, rate_hz=options.replay_rate_hz, loop=options.replay_loop)
-    if kind is Kind.HTTP_JPEG:
-        return HttpMjpegSource(
-            text, options.request, open_timeout_s=options.open_timeout_s, must_be_whole=options.drop_corrupt
-        )
-    if kind is Kind.DECODED_STREAM:
-        return DecodedStreamSource(
-            text,
-            options.request,
-            open_timeout_s=options.open_timeout_s,
-            stall_timeout_s=options.stall_timeout_s,
-        )
+    check_choice(text)
+    scheme = _scheme(text)
+    if scheme:
+        return _URL_BUILDERS[scheme](text, options)
+    if _is_recording(text):
+        return _recording(Path(text), options)
     pinned = PinnedChoice(text, tree or SystemTree())
     return V4l2Source(
         kernel or LinuxKernel(),
@@ -109,3 +87,45 @@ def make_source(
         must_be_whole=options.drop_corrupt,
         user=user,
     )
+
+
+def _scheme(text: str) -> str:
+    scheme, separator, _ = text.partition("://")
+    return scheme.lower() if separator else ""
+
+
+def _is_recording(text: str) -> bool:
+    if text.startswith("/dev/") or re.fullmatch(r"(serial|port|number):.*|\d{1,3}", text):
+        return False
+    path = Path(text).expanduser()
+    return path.exists() or "/" in text or path.suffix.lower() in _VIDEO_SUFFIXES
+
+
+def _recording(path: Path, options: SourceOptions) -> FrameSource:
+    recording = open_recording(path.expanduser())
+    return Replay(recording, options.request, rate_hz=options.replay_rate_hz, loop=options.replay_loop)
+
+
+def _file_url(url: str, options: SourceOptions) -> FrameSource:
+    return _recording(Path(unquote(urlsplit(url).path)), options)
+
+
+def _http_url(url: str, options: SourceOptions) -> FrameSource:
+    if urlsplit(url).path.lower().endswith(_VIDEO_SUFFIXES) and not url.lower().endswith(".mjpg"):
+        return _decoded_stream(url, options)
+    return HttpMjpegSource(
+        url, options.request, open_timeout_s=options.open_timeout_s, must_be_whole=options.drop_corrupt
+    )
+
+
+def _decoded_stream(url: str, options: SourceOptions) -> FrameSource:
+    return DecodedStreamSource(
+        url, options.request, open_timeout_s=options.open_timeout_s, stall_timeout_s=options.stall_timeout_s
+    )
+
+
+register_url_scheme("file", _file_url)
+for _scheme_name in ("http", "https"):
+    register_url_scheme(_scheme_name, _http_url)
+for _scheme_name in ("rtsp", "rtsps", "rtmp", "udp", "tcp", "srt"):
+    register_url_scheme(_scheme_name, _decoded_stream)

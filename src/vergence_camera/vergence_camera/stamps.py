@@ -1,4 +1,4 @@
-"""From a capture time on some clock of this machine to ROS time."""
+"""From a capture time on a clock of this machine to ROS time."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -18,8 +18,8 @@ class Stamp(NamedTuple):
 class Stamper:
     """Stamps frames in ROS time, strictly increasing; `ros_now_ns` reads it and may be replaced at any time.
 
-    The conversion is made afresh for each frame: its age is read on the clock that its capture time came from, and
-    taken from ROS time now. A wall clock that is stepped, or simulated time, is thereby followed at once.
+    The conversion is made for each frame: its age, read on the clock of its capture time, is subtracted from ROS time
+    now. A step of the wall clock, or simulated time, is thereby followed at once.
     """
 
     def __init__(self, ros_now_ns: Callable[[], int]) -> None:

@@ -41,7 +41,7 @@ def machine(tmp_path: Path) -> FakeMachine:
 def start(graph: Any, machine: FakeMachine) -> Callable[..., CameraNode]:
     def make(eye: str = "left", **parameters: Any) -> CameraNode:
         # On a machine that pauses no frame is too old, and silence is no stall.
-        patience = {"stall_timeout_s": 60.0, "max_age_s": 60.0, "first_retry_s": 0.02, "last_retry_s": 0.05}
+        patience = {"stall_timeout_s": 60.0, "max_age_s": 60.0, "retry.first_s": 0.02, "retry.longest_s": 0.05}
         values = {"device": "0", **patience, **parameters}
         kind = partial(CameraNode, kernel=machine.kernel, tree=machine.tree, namespace=eye)
         node: CameraNode = graph.start(kind, **values)

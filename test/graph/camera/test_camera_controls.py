@@ -78,7 +78,7 @@ def test_both_eyes_are_locked_to_one_exposure_and_white_balance(
     assert follower.has_parameter("control.gain")
     alone = graph.set_parameters(follower, **{"control.gain": 99})
     assert not alone.successful, "the eyes are no longer locked"
-    assert "set it there" in alone.reason
+    assert "set it on the partner" in alone.reason
     assert right.controls[v4l2.CID_GAIN].value == 30
     assert graph.set_parameters(follower, **{"control.brightness": 5}).successful, "what is not shared is its own"
 

@@ -1,4 +1,4 @@
-"""The boards: where their corners are, and finding them in a picture (OpenCV 4 and 5)."""
+"""Calibration boards: their corners, and finding them in a picture (OpenCV 4 and 5)."""
 
 import re
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _SMALLEST_CHARUCO = 8
 
 
 class BoardError(ValueError):
-    """A board that cannot be, or a picture in which it cannot be used; the message says why."""
+    """An invalid board, or a picture in which it is not found; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Chessboard:
 
     def __post_init__(self) -> None:
         if self.columns < 3 or self.rows < 3:
-            raise BoardError(f"board is {self.columns}x{self.rows}: allowed are at least 3x3 inner corners")
+            raise BoardError(f"board must have at least 3x3 inner corners: got {self.columns}x{self.rows}")
         _check_length("square_m", self.square_m)
 
     @property
@@ -65,7 +65,7 @@ class Chessboard:
         return self.columns, self.rows
 
     def detect(self, grey: Pixels) -> Detection:
-        """See Board. All corners must be seen."""
+        """See Board. All corners must be visible."""
         flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
         found, corners = cv2.findChessboardCorners(grey, (self.columns, self.rows), flags=flags)
         if not found:
@@ -86,7 +86,7 @@ class Chessboard:
 
 @dataclass(frozen=True)
 class Charuco:
-    """A ChArUco board of `columns` x `rows` squares with markers of `marker_m`; it may be partly out of sight."""
+    """A ChArUco board of `columns` x `rows` squares with markers of `marker_m`; it may be partly hidden."""
 
     columns: int
     rows: int
@@ -98,12 +98,12 @@ class Charuco:
         _check_length("square_m", self.square_m)
         _check_length("marker_m", self.marker_m)
         if self.marker_m >= self.square_m:
-            raise BoardError(f"marker_m is {self.marker_m:g}: allowed is less than square_m, {self.square_m:g}")
+            raise BoardError(f"marker_m must be less than square_m, {self.square_m:g}: got {self.marker_m:g}")
         if not hasattr(cv2, "aruco") or not hasattr(cv2.aruco, "CharucoDetector"):
-            raise BoardError(f"OpenCV {cv2.__version__} cannot find ChArUco boards: 4.7 or later can")
+            raise BoardError(f"ChArUco boards need OpenCV 4.7 or later: got {cv2.__version__}")
         if not hasattr(cv2.aruco, self.dictionary):
             known = ", ".join(sorted(name for name in dir(cv2.aruco) if name.startswith("DICT_")))
-            raise BoardError(f"dictionary is {self.dictionary!r}: allowed is one of {known}")
+            raise BoardError(f"dictionary must be one of {known}: got {self.dictionary!r}")
 
     @property
     def cells(self) -> tuple[int, int]:
@@ -138,11 +138,11 @@ def parse_board(text: str, square_m: float, marker_m: float | None = None) -> Bo
         marker_m: side of a marker [m]; three quarters of the square if not given.
 
     Raises:
-        BoardError: a text that describes none, or sizes that cannot be.
+        BoardError: a text that describes no board, or invalid sizes.
     """
     found = re.fullmatch(r"(charuco:)?(\d+)[xX](\d+)(?::(\w+))?", text)
     if found is None or (found.group(4) and not found.group(1)):
-        raise BoardError(f"board is {text!r}: allowed is COLUMNSxROWS or charuco:COLUMNSxROWS[:DICTIONARY]")
+        raise BoardError(f"board must be COLUMNSxROWS or charuco:COLUMNSxROWS[:DICTIONARY]: got {text!r}")
     columns, rows = int(found.group(2)), int(found.group(3))
     if not found.group(1):
         return Chessboard(columns, rows, square_m)
@@ -161,4 +161,4 @@ def _refine(grey: Pixels, points: Points, spacing_px: float) -> Points:
 
 def _check_length(name: str, value: float) -> None:
     if not (np.isfinite(value) and 0.0 < value < 10.0):
-        raise BoardError(f"{name} is {value:g}: allowed is above 0 and below 10 [m]")
+        raise BoardError(f"{name} must be above 0 and below 10 [m]: got {value:g}")

@@ -1,4 +1,4 @@
-"""Collecting views of a board: which are worth having, and how well they cover the picture."""
+"""Collecting views of a board: which ones are kept, and how well they cover the picture."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ class View:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of an offered view; `reason` says why it was rejected."""
+    """Whether a view was accepted; `reason` says why it was rejected."""
 
     name: str
     accepted: bool
@@ -36,7 +36,7 @@ class Coverage:
     """How the corners of one eye fill the picture.
 
     `cells` (6, 8) counts corners per cell. `sizes` and `slants` are the ranges of the board's extent relative to the
-    picture's and of the ratio of its opposite sides: a range of less than about 0.1 leaves the focal length loose.
+    picture's and of the ratio of its opposite sides: a range of less than about 0.1 leaves the focal length uncertain.
     """
 
     cells: npt.NDArray[np.int64]
@@ -74,10 +74,10 @@ class Coverage:
 
 @dataclass
 class ViewCollector:
-    """Takes pictures of one eye or of a pair, keeps what is useful and remembers why the rest was not.
+    """Collects views of one eye or of a pair, and records why others were rejected.
 
     `least_change` is the least mean movement of the corners against every view kept so far, relative to the picture's
-    width; it keeps a live stream from giving the same view a hundred times.
+    width; it prevents a live stream from adding the same view repeatedly.
     """
 
     board: Board
@@ -89,7 +89,7 @@ class ViewCollector:
     def offer(self, name: str, pictures: dict[str, Pixels], is_steady: Callable[[View], bool] | None = None) -> Verdict:
         """Look for the board in `pictures` (by eye: "left", "right") and keep the view if it is useful.
 
-        `is_steady` may refuse a view that was found, such as one taken while the board moved.
+        `is_steady` may refuse a view that was found, such as one during which the board moved.
         """
         try:
             view = self._look(name, pictures)

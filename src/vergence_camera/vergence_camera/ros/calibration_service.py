@@ -1,4 +1,4 @@
-"""The camera_info side of the node: load, publish, take a new calibration and save it."""
+"""A camera's calibration: loads it, makes camera_info of it, and saves a new one (set_camera_info)."""
 
 from ament_index_python.packages import get_package_share_directory
 from rclpy.node import Node
@@ -18,20 +18,20 @@ from vergence_camera.ros.camera_messages import calibration_from_message, camera
 from vergence_common.diagnostics import OK, WARN, Report
 
 
-class NodeCalibration:
+class CalibrationService:
     """Holds the calibration of one camera and serves `set_camera_info`."""
 
     def __init__(self, node: Node, url: str, name: str) -> None:
         self._node, self._name = node, name
         self._path = calibration_path(url, name, get_package_share_directory)
         self._calibration: Calibration | None = None
-        self._trouble = f"no calibration at {self._path}: camera_info is blank"
+        self._problem = f"no calibration at {self._path}: camera_info is blank"
         if url or self._path.exists():
             try:
                 self._calibration = load_calibration(self._path)
             except CameraCalibrationError as error:
-                self._trouble = f"{error}: camera_info is blank"
-                node.get_logger().warning(self._trouble)
+                self._problem = f"{error}: camera_info is blank"
+                node.get_logger().warning(self._problem)
         self._size = (0, 0)
         self._message = CameraInfo()
         node.create_service(SetCameraInfo, "set_camera_info", self._set)
@@ -45,38 +45,38 @@ class NodeCalibration:
         message.header = header
         return message
 
-    def mode_known(self, mode: Mode) -> None:
-        """Compare the calibration with the stream, so that a misfit is said before the first frame."""
+    def set_mode(self, mode: Mode) -> None:
+        """Compare the calibration with the stream, so that a wrong size is logged before the first frame."""
         self._size = (mode.width_px, mode.height_px)
         self._refresh()
 
     def report(self) -> Report:
         """Return the diagnostic."""
-        if self._fits():
+        if self._has_size_of_stream():
             return Report(OK, "calibrated", {"file": self._path})
-        return Report(WARN, self._trouble, {"file": self._path})
+        return Report(WARN, self._problem, {"file": self._path})
 
-    def _fits(self) -> bool:
+    def _has_size_of_stream(self) -> bool:
         calibration = self._calibration
         return calibration is not None and self._size in ((0, 0), (calibration.width_px, calibration.height_px))
 
     def _refresh(self) -> None:
         calibration = self._calibration
-        if calibration is not None and not self._fits():
-            self._trouble = (
-                f"{self._path} is for {calibration.width_px}x{calibration.height_px}, the camera gives "
-                f"{self._size[0]}x{self._size[1]}: camera_info is blank"
+        if calibration is not None and not self._has_size_of_stream():
+            self._problem = (
+                f"no calibration for {self._size[0]}x{self._size[1]} images: {self._path} is for "
+                f"{calibration.width_px}x{calibration.height_px}: camera_info is blank"
             )
-            self._node.get_logger().warning(self._trouble)
-        self._message = camera_info_message(calibration if self._fits() else None, *self._size, Header())
+            self._node.get_logger().warning(self._problem)
+        self._message = camera_info_message(calibration if self._has_size_of_stream() else None, *self._size, Header())
 
     def _set(self, request: SetCameraInfo.Request, response: SetCameraInfo.Response) -> SetCameraInfo.Response:
         try:
             calibration = calibration_from_message(request.camera_info, self._name)
             if self._size not in ((0, 0), (calibration.width_px, calibration.height_px)):
                 raise CameraCalibrationError(
-                    f"image size is {calibration.width_px}x{calibration.height_px}: allowed is what the camera "
-                    f"gives, {self._size[0]}x{self._size[1]}"
+                    f"image size must be the camera's, {self._size[0]}x{self._size[1]}: "
+                    f"got {calibration.width_px}x{calibration.height_px}"
                 )
             save_calibration(calibration, self._path)
         except (CameraCalibrationError, OSError) as error:

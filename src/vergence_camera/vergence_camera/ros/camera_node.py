@@ -9,20 +9,20 @@ from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
-from vergence_camera.capture_loop import CaptureLoop
+from vergence_camera.capture_loop import CaptureLoop, RetryPolicy
+from vergence_camera.capture_statistics import CaptureStatistics
 from vergence_camera.control_port import ControlPort
 from vergence_camera.devices import SystemTree, choose, find_devices
 from vergence_camera.errors import CameraError, CorruptFrameError
-from vergence_camera.frame import Encoding, Frame
-from vergence_camera.health import Health
-from vergence_camera.pair import Eye
-from vergence_camera.parameters import GROUPS, CameraParameters
+from vergence_camera.frame import Encoding, Frame, ModeRequest
+from vergence_camera.pair import EyeCamera
+from vergence_camera.parameters import GROUPS, CameraParameters, ReplayParameters, RetryParameters
 from vergence_camera.pixels import decode, encode_jpeg
-from vergence_camera.ros.calibration_service import NodeCalibration
-from vergence_camera.ros.camera_controls import PREFIX, NodeControls
+from vergence_camera.ros.calibration_service import CalibrationService
+from vergence_camera.ros.camera_controls import PREFIX, CameraControls
 from vergence_camera.ros.camera_messages import JpegSerializer
-from vergence_camera.ros.partner import Partner
-from vergence_camera.source_choice import make_source
+from vergence_camera.ros.partner import PartnerCamera
+from vergence_camera.source_choice import SourceOptions, make_source
 from vergence_camera.stamps import Stamp, Stamper
 from vergence_camera.v4l2.kernel import Kernel
 from vergence_common.diagnostics import ERROR, OK, STALE, WARN, Diagnostics, Report
@@ -35,13 +35,13 @@ from vergence_rig.rig import load_rig
 
 
 class CameraNode(Node):
-    """Publishes one camera. `kernel` and `tree` replace the machine's own in tests; the rest goes to Node."""
+    """Publishes one camera. `kernel` and `tree` replace the machine's own in tests; other options go to Node."""
 
     def __init__(self, *, kernel: Kernel | None = None, tree: SystemTree | None = None, **node_options: Any) -> None:
         super().__init__("camera_node", **node_options)
         self._tree = tree or SystemTree()
-        self._port = ControlPort(lambda text: self._say(text, True))
-        self._controls = NodeControls(self, self._port)
+        self._port = ControlPort(lambda text: self._log(text, True))
+        self._controls = CameraControls(self, self._port)
         self._settings = declare(self, GROUPS, allow_prefixes=(PREFIX,))
         settings: CameraParameters = self._settings.value
         eye = self.get_namespace().rpartition("/")[2]
@@ -55,42 +55,42 @@ class CameraNode(Node):
         self._wanted = (False, False, False)
         topics = ((CompressedImage, "image_raw/compressed"), (CameraInfo, "camera_info"), (Image, "image_raw"))
         self._publishers_of_frames = tuple(
-            qos.create_publisher(kind, topic, IMAGE_QOS, matched=self._see_listeners) for kind, topic in topics
+            qos.create_publisher(kind, topic, IMAGE_QOS, matched=self._update_subscribers) for kind, topic in topics
         )
         self._compressed, self._info, self._raw = self._publishers_of_frames
-        self._calibration = NodeCalibration(self, settings.camera_info_url, settings.camera_name or eye or "camera")
-        self._partner: Partner | None = None
+        self._calibration = CalibrationService(self, settings.camera_info_url, settings.camera_name or eye or "camera")
+        self._partner: PartnerCamera | None = None
         if settings.partner:
-            self._partner = Partner(self, settings.partner, self._tree, self._port.locked_names, self._controls.follow)
+            self._partner = PartnerCamera(
+                self, settings.partner, self._tree, self._port.locked_names, self._controls.follow
+            )
             diagnostics.add("pair", self._report_pair)
         diagnostics.add("camera", self._report)
         diagnostics.add("calibration", self._calibration.report)
         diagnostics.add("controls", self._controls.report)
 
-        self._health = Health()
+        self._statistics = CaptureStatistics()
         self._stamper = Stamper(time.time_ns)
-        self._see_clock()
-        self.add_post_set_parameters_callback(self._see_clock)
-        source = make_source(
-            settings.device, settings.source_options(), kernel=kernel, tree=self._tree, user=self._port
-        )
+        self._choose_clock()
+        self.add_post_set_parameters_callback(self._choose_clock)
+        source = make_source(settings.device, self._source_options(), kernel=kernel, tree=self._tree, user=self._port)
         self._loop = CaptureLoop(
             source,
             self._deliver,
             self._stamper,
-            self._health,
-            patience=settings.patience(),
-            say=self._say,
+            self._statistics,
+            retry_policy=self._retry_policy(),
+            log=self._log,
             ended=self._end,
         )
         self._settings.on_change(self._on_change)
         try:
-            self._calibration.mode_known(self._loop.connect())
+            self._calibration.set_mode(self._loop.connect())
         except CameraError as error:
             if error.permanent:
                 self._loop.stop()
                 raise
-            self._say(f"{error}; trying again", True)
+            self._log(f"{error}; it is tried again", True)
         self._controls.update()
         self._loop.start()
 
@@ -99,7 +99,7 @@ class CameraNode(Node):
         self._loop.stop()
 
     def _deliver(self, frame: Frame, stamp: Stamp) -> None:
-        """Publish one frame, in the capture thread; each form only if someone listens to it."""
+        """Publish one frame, in the capture thread; each form only if it has subscribers."""
         began_ns = time.monotonic_ns()
         try:
             jpeg_wanted, info_wanted, raw_wanted = self._wanted
@@ -112,21 +112,21 @@ class CameraNode(Node):
                 pixels, encoding = decode(frame)
                 self._raw.publish(array_to_image(pixels, self._header(stamp), encoding))
         except CorruptFrameError as error:
-            self._health.corrupt(error)
+            self._statistics.corrupt(error)
             return
         except Exception:
             if self.context.ok():
                 raise
             return  # a signal shut the context down while this frame was on its way
         if self._partner is not None:
-            self._partner.skew.own(stamp.ros_ns)
-        self._health.published((stamp.age_ns + time.monotonic_ns() - began_ns) * 1e-9)
+            self._partner.skew.add_own(stamp.ros_ns)
+        self._statistics.published((stamp.age_ns + time.monotonic_ns() - began_ns) * 1e-9)
 
-    def _see_listeners(self, _: object = None) -> None:
-        """See who listens, now that one came or went. To ask for every frame would cost as much as to send it."""
+    def _update_subscribers(self, _: object = None) -> None:
+        """Record which topics have subscribers. Asking for every frame would cost as much as sending it."""
         self._wanted = tuple(publisher.get_subscription_count() > 0 for publisher in self._publishers_of_frames)
 
-    def _see_clock(self, _: object = None) -> None:
+    def _choose_clock(self, _: object = None) -> None:
         # Without simulated time ROS time is the wall clock, and reading that directly costs a tenth.
         simulated = self.get_parameter("use_sim_time").value
         self._stamper.ros_now_ns = self._simulated_now_ns if simulated else time.time_ns
@@ -142,29 +142,57 @@ class CameraNode(Node):
             return frame.data
         return encode_jpeg(decode(frame)[0], self._settings.value.jpeg_quality)
 
+    def _source_options(self) -> SourceOptions:
+        settings: CameraParameters = self._settings.value
+        replay = self._settings.get(ReplayParameters)
+        return SourceOptions(
+            request=ModeRequest(settings.pixel_format, settings.width_px, settings.height_px, settings.rate_hz),
+            replay_rate_hz=replay.rate_hz,
+            replay_loop=replay.loop,
+            open_timeout_s=settings.open_timeout_s,
+            stall_timeout_s=settings.stall_timeout_s,
+            drop_corrupt=settings.drop_corrupt,
+            buffers=settings.buffers,
+        )
+
+    def _retry_policy(self) -> RetryPolicy:
+        settings: CameraParameters = self._settings.value
+        retry = self._settings.get(RetryParameters)
+        return RetryPolicy(
+            stall_s=settings.stall_timeout_s,
+            max_age_s=settings.max_age_s,
+            first_s=retry.first_s,
+            longest_s=retry.longest_s,
+            stamp_offset_s=settings.stamp_offset_s,
+        )
+
     def _on_change(self, parameters: ParameterSet) -> None:
         settings: CameraParameters = parameters.value
-        self._loop.patience = settings.patience()
+        self._loop.retry_policy = self._retry_policy()
         self._controls.configure(settings.lock, settings.lock_after_s)
 
     def _report(self) -> Report:
-        self._see_listeners()  # not every middleware tells
-        state = self._health.snapshot()
+        self._update_subscribers()  # not every middleware reports matches
+        state = self._statistics.snapshot()
         settings: CameraParameters = self._settings.value
-        request = settings.source_options().request
-        values = {"device": settings.device, "asked": request, "mode": state.mode or "none", **state.values()}
+        request = self._source_options().request
+        values = {"device": settings.device, "requested": request, "mode": state.mode or "none", **state.values()}
         values["stamps_pushed_forward"], values["clock_jumps"] = self._stamper.pushed_forward, self._stamper.clock_jumps
         if state.ended:
-            return Report(STALE, "the recording has been played to its end", values)
+            return Report(STALE, "the recording has ended", values)
         if not state.connected or state.mode is None:
             return Report(ERROR, state.last_fault or "not connected yet", values)
         if state.mode.rate_hz and state.rate_hz < 0.9 * state.mode.rate_hz:
             text = f"{state.rate_hz:.1f} Hz of {state.mode.rate_hz:g} Hz: a dim room, or USB or CPU at their limit"
             return Report(WARN, text, values)
         if request.soft_mismatch(state.mode):
-            return Report(WARN, f"asked for {request}, the camera gives {state.mode}", values)
-        if self._rig_size not in (None, (state.mode.width_px, state.mode.height_px)):
-            return Report(WARN, f"the rig describes a camera of {self._rig_size} px, this is {state.mode}", values)
+            return Report(WARN, f"requested {request}, the camera gives {state.mode}", values)
+        if self._rig_size is not None and self._rig_size != (state.mode.width_px, state.mode.height_px):
+            return Report(
+                WARN,
+                f"rig.yaml has images of {self._rig_size[0]}x{self._rig_size[1]}, the camera gives {state.mode}",
+                values,
+            )
         return Report(OK, f"streaming {state.mode}", values)
 
     def _report_pair(self) -> Report:
@@ -176,7 +204,7 @@ class CameraNode(Node):
             controller = ""
         values, names = self._port.values(), self._port.locked_names()
         shared = {name: values[name] for name in names if name in values}
-        own = Eye(self.get_fully_qualified_name(), controller, self._health.snapshot().rate_hz, shared)
+        own = EyeCamera(self.get_fully_qualified_name(), controller, self._statistics.snapshot().rate_hz, shared)
         return self._partner.report(own, settings.max_skew_s)
 
     def _size_in_rig(self, path: str, eye: str) -> tuple[int, int] | None:
@@ -185,13 +213,13 @@ class CameraNode(Node):
         return None if spec is None else (spec.width_px, spec.height_px)
 
     def _end(self) -> None:
-        """Let the last frames arrive, then end the process: a recording that is played once is a finite task."""
+        """Wait until the last frames have arrived, then end the process: a recording played once is a finite task."""
         for publisher in self._publishers_of_frames:
             publisher.wait_for_all_acked(Duration(seconds=3))
         self.context.try_shutdown()
 
-    def _say(self, text: str, bad: bool) -> None:
-        if bad:
+    def _log(self, text: str, warning: bool) -> None:
+        if warning:
             self.get_logger().warning(text)
         else:
             self.get_logger().info(text)

@@ -1,4 +1,4 @@
-"""What the node knows of the other eye: its stamps by camera_info, its device and controls by its parameters."""
+"""The other eye's camera node: its stamps from camera_info, its device and controls from its parameters."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from sensor_msgs.msg import CameraInfo
 
 from vergence_camera.devices import SystemTree, choose, find_devices
 from vergence_camera.errors import CameraError
-from vergence_camera.pair import Eye, SkewMeter, faults_of_pair
+from vergence_camera.pair import EyeCamera, SkewMeter, faults_of_pair
 from vergence_camera.ros.camera_controls import PREFIX
 from vergence_common.diagnostics import OK, STALE, WARN, Report
 from vergence_common.qos import IMAGE_QOS
@@ -19,10 +19,10 @@ from vergence_common.stamps import to_nanoseconds
 _PERIOD_S = 1.0
 
 
-class Partner:
-    """Asks the other camera node for its parameters once a second and compares the two eyes.
+class PartnerCamera:
+    """Requests the other camera node's parameters once a second and compares the two cameras.
 
-    `locked_names` gives the controls to ask for; `changed` gets their values whenever they have come.
+    `locked_names` returns the controls to request; `changed` is called with their values after every reply.
     """
 
     def __init__(
@@ -37,35 +37,39 @@ class Partner:
         self._locked_names, self._changed = locked_names, changed
         self.skew = SkewMeter()
         self._values: dict[str, Any] = {}
-        self._asked_s_ago = 0
+        self._requested_s_ago = 0
         self._pending: Any = None
         self._client = AsyncParameterClient(node, partner)
         namespace = partner.rpartition("/")[0]
         node.create_subscription(CameraInfo, f"{namespace}/camera_info", self._on_camera_info, IMAGE_QOS)
-        node.create_timer(_PERIOD_S, self._ask)
+        node.create_timer(_PERIOD_S, self._request)
 
-    def report(self, own: Eye, max_skew_s: float) -> Report:
+    def report(self, own: EyeCamera, max_skew_s: float) -> Report:
         """Return the diagnostic of the pair."""
         skew_s = self.skew.skew_s()
         if skew_s != skew_s:
-            return Report(STALE, f"nothing comes from {self._name}")
+            return Report(STALE, f"no camera_info from {self._name}")
         controls = {name.removeprefix(PREFIX): value for name, value in self._values.items() if PREFIX in name}
-        other = Eye(self._name, self._controller(), self.skew.other_rate_hz(), controls)
+        other = EyeCamera(self._name, self._controller(), self.skew.other_rate_hz(), controls)
         faults = faults_of_pair(own, other, skew_s, max_skew_s)
         values = {"skew_ms": round(skew_s * 1e3, 2), "partner_rate_hz": round(other.rate_hz, 2)}
-        return Report(WARN, "; ".join(faults), values) if faults else Report(OK, "the eyes fit together", values)
+        return (
+            Report(WARN, "; ".join(faults), values)
+            if faults
+            else Report(OK, "cameras synchronised, settings match", values)
+        )
 
     def _on_camera_info(self, message: CameraInfo) -> None:
-        self.skew.other(to_nanoseconds(message.header.stamp))
+        self.skew.add_other(to_nanoseconds(message.header.stamp))
 
-    def _ask(self) -> None:
+    def _request(self) -> None:
         if not self._client.services_are_ready():
             return
-        # A partner that dies while it is asked never answers: ask anew after some seconds.
-        self._asked_s_ago += 1
-        if self._pending is not None and not self._pending.done() and self._asked_s_ago < 5:
+        # A partner that ends before its reply never sends one: the request is repeated after some seconds.
+        self._requested_s_ago += 1
+        if self._pending is not None and not self._pending.done() and self._requested_s_ago < 5:
             return
-        self._asked_s_ago = 0
+        self._requested_s_ago = 0
         self._pending = self._client.list_parameters(prefixes=["control"])
         self._pending.add_done_callback(self._on_list)
 
@@ -81,7 +85,7 @@ class Partner:
         self._changed({n.removeprefix(PREFIX): v for n, v in self._values.items() if n.startswith(PREFIX)})
 
     def _controller(self) -> str:
-        """Return the partner's USB controller; empty if it is no camera of this machine."""
+        """Return the partner's USB controller; empty if it is not a camera of this machine."""
         try:
             return choose(str(self._values.get("device", "")), find_devices(self._tree)).controller
         except CameraError:

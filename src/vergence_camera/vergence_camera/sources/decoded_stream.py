@@ -7,8 +7,8 @@ import numpy as np
 
 from vergence_camera.errors import CameraError, DisconnectedError, ModeMismatchError, WrongSizeError
 from vergence_camera.frame import Clock, Encoding, Frame, Mode, ModeRequest
-from vergence_camera.sources.asked_mode import check_asked, mode_of, size_alone
 from vergence_camera.sources.http_client import shown_url
+from vergence_camera.sources.requested_mode import check_requested, mode_of, size_alone
 
 
 class DecodedStreamSource:
@@ -44,7 +44,7 @@ class DecodedStreamSource:
         self._capture = capture
         self._mode = mode_of(capture)
         try:
-            check_asked(size_alone(self._request), self._mode, self.identity, "stream")
+            check_requested(size_alone(self._request), self._mode, self.identity, "stream")
         except ModeMismatchError:
             self.close()
             raise

@@ -38,7 +38,9 @@ class HttpStream:
             self.close()
             reason = f"{shown_url(url)}: the server answers {status}"
             if status in (401, 403):
-                raise PermissionDeniedError(f"{reason}: it wants a user and password (http://user:password@host/...)")
+                raise PermissionDeniedError(
+                    f"{reason}: it requires a user and password (http://user:password@host/...)"
+                )
             raise DisconnectedError(reason)
 
     def read(self, timeout_s: float) -> bytes | None:

@@ -6,9 +6,9 @@ import time
 from vergence_camera.errors import CameraError, DisconnectedError, WrongSizeError
 from vergence_camera.frame import Clock, Encoding, Frame, Mode, ModeRequest
 from vergence_camera.jpeg import JpegInfo, inspect_jpeg
-from vergence_camera.sources.asked_mode import check_asked
 from vergence_camera.sources.http_client import HttpStream, shown_url
 from vergence_camera.sources.multipart import MultipartParser, Part, boundary_of
+from vergence_camera.sources.requested_mode import check_requested
 
 
 class HttpMjpegSource:
@@ -44,7 +44,7 @@ class HttpMjpegSource:
                 raise type(error)(f"{self.identity}: {error}") from None
             first = self._first_picture(deadline)
             self._mode = Mode("MJPG", first.width_px, first.height_px, 0.0)
-            check_asked(self._request, self._mode, self.identity, "stream")
+            check_requested(self._request, self._mode, self.identity, "stream")
         except BaseException:
             self.close()
             raise
@@ -54,7 +54,7 @@ class HttpMjpegSource:
         """See FrameSource."""
         if not self._parts:
             self._receive(timeout_s)
-        with contextlib.suppress(DisconnectedError):  # what has come is shown first; the next read says it again
+        with contextlib.suppress(DisconnectedError):  # the received pictures come first; the next read raises it again
             while self._parts and self._receive(0.0):
                 pass
         if not self._parts:
@@ -81,7 +81,7 @@ class HttpMjpegSource:
         self._parts.clear()
 
     def _receive(self, timeout_s: float) -> bool:
-        """Take in what the connection has; True if it had anything."""
+        """Read what the connection has; True if it had anything."""
         if self._stream is None:
             raise DisconnectedError(f"{self.identity}: read before open")
         try:

@@ -31,7 +31,7 @@ def boundary_of(content_type: str) -> bytes:
 
 
 class MultipartParser:
-    """Feed it bytes, take parts. Damage costs the part it is in: the next boundary line is looked for."""
+    """Finds the parts in a stream of bytes. A damaged part is lost; parsing resumes at the next boundary line."""
 
     def __init__(self, boundary: bytes) -> None:
         self._boundary = boundary
@@ -48,7 +48,7 @@ class MultipartParser:
             if self._body_begin is None and not self._find_body(now_ns):
                 break
             time_ns = self._part_time_ns
-            body = self._take_body()
+            body = self._read_body()
             if body is None:
                 break
             parts.append(Part(body, time_ns))
@@ -76,7 +76,7 @@ class MultipartParser:
         self._body_begin = blank.end()
         return True
 
-    def _take_body(self) -> bytes | None:
+    def _read_body(self) -> bytes | None:
         assert self._body_begin is not None
         begin = self._body_begin
         if self._length is not None and self._length <= _LONGEST_PART:

@@ -10,9 +10,9 @@ import numpy as np
 from vergence_camera.errors import CorruptFrameError, FileMissingError, TruncatedFileError, UnsupportedError
 from vergence_camera.frame import Mode, Pixels
 from vergence_camera.jpeg import inspect_jpeg
-from vergence_camera.sources.asked_mode import mode_of
 from vergence_camera.sources.avi_demuxer import frames, is_avi, read_header
 from vergence_camera.sources.replay import Picture, Recording
+from vergence_camera.sources.requested_mode import mode_of
 
 PICTURE_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"}
 _JPEG_SUFFIXES = {".jpg", ".jpeg"}
@@ -134,7 +134,7 @@ def open_recording(path: Path) -> Recording:
     if not path.is_file():
         raise FileMissingError(f"{path}: there is no such file")
     if path.suffix.lower() in PICTURE_SUFFIXES:
-        raise UnsupportedError(f"{path}: is one picture; give the folder that holds it")
+        raise UnsupportedError(f"{path}: is one picture; give its folder")
     if is_avi(path):
         with path.open("rb") as file:
             if read_header(file, str(path)).is_mjpeg:

@@ -8,7 +8,7 @@ from typing import Protocol, TypeAlias
 from vergence_camera.errors import CorruptFrameError, ReplayEndedError, TruncatedFileError
 from vergence_camera.frame import Clock, Encoding, Frame, Mode, ModeRequest, Pixels
 from vergence_camera.jpeg import inspect_jpeg
-from vergence_camera.sources.asked_mode import check_asked, size_alone
+from vergence_camera.sources.requested_mode import check_requested, size_alone
 
 # One recorded picture: JPEG bytes as they lie in the file, or decoded pixels (BGR or grey).
 Picture: TypeAlias = bytes | Pixels
@@ -69,7 +69,7 @@ class Replay:
         found = self._recording.mode()
         rate = self._asked_rate_hz or found.rate_hz or self._default_rate_hz
         self._mode = Mode(found.pixel_format, found.width_px, found.height_px, rate)
-        check_asked(size_alone(self._request), self._mode, self.identity, "recording")
+        check_requested(size_alone(self._request), self._mode, self.identity, "recording")
         self._pictures = self._recording.pictures()
         self._due_ns, self._period_ns = self._now_ns(), round(1e9 / rate)
         return self._mode
@@ -100,7 +100,7 @@ class Replay:
 
     def _next(self) -> Picture:
         if self._pictures is None:
-            raise ReplayEndedError(f"{self.identity}: has been played to its end")
+            raise ReplayEndedError(f"{self.identity}: the recording has ended")
         try:
             picture = next(self._pictures)
         except (StopIteration, TruncatedFileError) as end:

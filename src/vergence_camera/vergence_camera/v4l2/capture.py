@@ -1,8 +1,10 @@
 """Streaming from a V4L2 device by memory-mapped buffers.
 
-Own ioctls rather than OpenCV's capture: the camera's JPEG comes out of the driver's buffer untouched with one copy,
-the kernel's stamp comes with the clock it was read from, its sequence counts what was lost before us, a stall is seen
-after any time we like and not after OpenCV's ten seconds, and the errno is there to explain a failure.
+Own ioctls rather than OpenCV's capture, because then
+- the camera's JPEG comes out of the driver's buffer untouched with one copy;
+- the kernel's stamp comes with its clock, and its sequence counts the frames that the driver dropped;
+- a stall is detected after any time-out and not after OpenCV's ten seconds;
+- the errno explains a failure.
 """
 
 import contextlib
@@ -24,7 +26,7 @@ _LONGEST_AGE_NS = 10_000_000_000
 
 
 class DeviceUser(Protocol):
-    """Who else works with the open device: its controls."""
+    """Another user of the open device: its controls."""
 
     def attach(self, kernel: Kernel, descriptor: int, path: str) -> None:
         """The device is open and has its mode; called before every start of the stream."""
@@ -38,8 +40,8 @@ class DeviceUser(Protocol):
 class V4l2Source:
     """A FrameSource for one V4L2 device.
 
-    `resolve` returns the device's present path: it is asked at every `open`, so that a camera that comes back under
-    another number is found. `user` is told of every opening and closing.
+    `resolve` returns the device's present path: it is called at every `open`, so that a camera which was reconnected
+    under another number is found. `user` is called at every opening and closing.
     """
 
     def __init__(
@@ -140,13 +142,13 @@ class V4l2Source:
         mode = Mode(v4l2.fourcc_text(pixels.pixelformat), pixels.width, pixels.height, rate_hz)
         if self._request.hard_mismatch(mode) or mode.pixel_format not in _ENCODINGS:
             raise ModeMismatchError(
-                f"{self._path}: asked for {self._request}, the camera gives {mode}; it offers {self._offers()}"
+                f"{self._path}: requested {self._request}, the camera gives {mode}; it offers {self._offers()}"
             )
         self._encoding, self._row_bytes = _ENCODINGS[mode.pixel_format], pixels.bytesperline
         return mode
 
     def _set_rate(self) -> float:
-        """Ask for the rate, and return the one that the driver has chosen (0 where it does not say)."""
+        """Request the rate, and return the one that the driver has chosen (0 where it reports none)."""
         parameters = v4l2.StreamParameters(type=v4l2.CAPTURE)
         try:
             self._ioctl("asking for its rate", v4l2.G_PARM, parameters)
@@ -164,7 +166,7 @@ class V4l2Source:
     def _offers(self) -> str:
         assert self._descriptor is not None
         sizes: Sequence[object] = offered_sizes(self._kernel, self._descriptor)
-        return "; ".join(str(size) for size in sizes) or "nothing that it lists"
+        return "; ".join(str(size) for size in sizes) or "no listed mode"
 
     def _start(self) -> None:
         assert self._descriptor is not None
@@ -181,7 +183,7 @@ class V4l2Source:
         self._ioctl("starting the stream", v4l2.STREAMON, v4l2.BufferType(v4l2.CAPTURE))
 
     def _queue(self, index: int) -> None:
-        self._ioctl("giving a buffer back", v4l2.QBUF, v4l2.Buffer(index=index, type=v4l2.CAPTURE, memory=v4l2.MMAP))
+        self._ioctl("queuing a buffer", v4l2.QBUF, v4l2.Buffer(index=index, type=v4l2.CAPTURE, memory=v4l2.MMAP))
 
     def _dequeue(self) -> v4l2.Buffer | None:
         assert self._descriptor is not None
@@ -191,7 +193,7 @@ class V4l2Source:
         except BlockingIOError:
             return None
         except OSError as error:
-            raise camera_error(error, "taking a frame", self._path) from error
+            raise camera_error(error, "dequeuing a frame", self._path) from error
         return buffer
 
     def _frame(self, buffer: v4l2.Buffer, data: bytes, skipped: int) -> Frame:
@@ -203,7 +205,7 @@ class V4l2Source:
             info = inspect_jpeg(data, must_be_whole=self._must_be_whole)
             if (info.width_px, info.height_px) != (width, height):
                 raise WrongSizeError(
-                    f"{self._path}: frame of {info.width_px}x{info.height_px}, the camera agreed on {width}x{height}"
+                    f"{self._path}: frame of {info.width_px}x{info.height_px}, the stream has {width}x{height}"
                 )
         else:
             data = self._rows(data)
@@ -214,14 +216,16 @@ class V4l2Source:
         wanted = self._mode.width_px * (2 if self._encoding is Encoding.YUYV else 1)
         stride = max(self._row_bytes, wanted)
         if len(data) < stride * (self._mode.height_px - 1) + wanted:
-            raise CorruptFrameError(f"{self._path}: frame of {len(data)} bytes, {stride * self._mode.height_px} wanted")
+            raise CorruptFrameError(
+                f"{self._path}: frame must have {stride * self._mode.height_px} bytes: got {len(data)}"
+            )
         if stride == wanted:
             return data[: wanted * self._mode.height_px]
         return b"".join(data[row * stride : row * stride + wanted] for row in range(self._mode.height_px))
 
 
 def _capture_time(buffer: v4l2.Buffer) -> tuple[int, Clock]:
-    """Return the kernel's stamp and its clock; a driver that does not say which is judged by the stamp's age."""
+    """Return the kernel's stamp and its clock; where the driver does not report the clock, the stamp's age decides."""
     stamp_ns = (buffer.timestamp.seconds * 1_000_000 + buffer.timestamp.microseconds) * 1000
     if buffer.flags & v4l2.TIMESTAMP_MASK == v4l2.TIMESTAMP_MONOTONIC:
         return stamp_ns, Clock.MONOTONIC

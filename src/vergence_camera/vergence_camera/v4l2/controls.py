@@ -1,4 +1,4 @@
-"""The controls of a camera (exposure, gain, white balance, ...): what there is, and setting several as one."""
+"""The controls of a camera (exposure, gain, white balance, ...): listing them, and setting several at once."""
 
 import contextlib
 import errno
@@ -49,7 +49,7 @@ class ControlSpec:
 
     @property
     def allowed(self) -> str:
-        """What is allowed, in words."""
+        """What the value must be, in words."""
         if self.is_boolean:
             return "true or false"
         if self.is_menu:
@@ -67,7 +67,7 @@ class ControlSpec:
         elif isinstance(value, int) and not isinstance(value, bool) and self.minimum <= value <= self.maximum:
             number = value if (value - self.minimum) % max(1, self.step) == 0 else None
         if number is None:
-            raise ControlError(f"control '{self.name}' is {value!r}: allowed is {self.allowed}")
+            raise ControlError(f"control '{self.name}' must be {self.allowed}: got {value!r}")
         return number
 
     def to_value(self, number: int) -> Value:
@@ -106,7 +106,7 @@ class Controls:
         for name, value in changes.items():
             spec = specs.get(name)
             if spec is None:
-                raise ControlError(f"control '{name}': this camera has none of that name; it has {', '.join(specs)}")
+                raise ControlError(f"there is no control '{name}': the camera has {', '.join(specs)}")
             if spec.read_only:
                 raise ControlError(f"control '{name}' is read-only")
             numbers[name] = spec.to_number(value)
@@ -223,8 +223,8 @@ class Controls:
         except OSError as error:
             if error.errno in _REFUSALS:
                 raise ControlError(
-                    f"control '{spec.name}' is {spec.to_value(number)!r}: the camera refuses it ({error.strerror}); "
-                    f"allowed is {spec.allowed}"
+                    f"control '{spec.name}' must be {spec.allowed}: the camera refuses {spec.to_value(number)!r} "
+                    f"({error.strerror})"
                 ) from error
             raise camera_error(error, f"setting control '{spec.name}'", self._path) from error
 

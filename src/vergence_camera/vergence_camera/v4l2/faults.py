@@ -1,4 +1,4 @@
-"""From the kernel's errno to an error that says what to do."""
+"""From the kernel's errno to an error that says how to solve it."""
 
 import errno
 import grp

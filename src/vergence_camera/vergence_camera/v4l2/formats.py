@@ -48,7 +48,7 @@ def query_capture(kernel: Kernel, descriptor: int, path: str) -> CaptureDevice:
     capabilities = answer.device_caps if answer.capabilities & v4l2.CAP_DEVICE_CAPS else answer.capabilities
     wanted = v4l2.CAP_VIDEO_CAPTURE | v4l2.CAP_STREAMING
     if capabilities & wanted != wanted:
-        raise UnsupportedError(f"{path}: '{_text(answer.card)}' gives no pictures (a metadata or output device)")
+        raise UnsupportedError(f"{path}: '{_text(answer.card)}' is no capture device (but a metadata or output device)")
     return CaptureDevice(_text(answer.driver), _text(answer.card), _text(answer.bus_info))
 
 

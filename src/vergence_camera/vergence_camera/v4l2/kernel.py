@@ -1,4 +1,4 @@
-"""The few system calls that V4L2 needs, behind a protocol whose fake ships in fake_kernel.py."""
+"""The few system calls that V4L2 needs, behind a protocol whose fake is in testing/fake_kernel.py."""
 
 import fcntl
 import mmap
@@ -21,7 +21,7 @@ class MappedBuffer(Protocol):
 
 
 class Kernel(Protocol):
-    """What a capture device is driven by. Every method raises OSError with the kernel's errno."""
+    """System calls on a capture device. Every method raises OSError with the kernel's errno."""
 
     def open(self, path: str) -> int:
         """Open a device for reading and writing, never blocking; return its descriptor."""

@@ -1,4 +1,4 @@
-"""Everything that is counted about one camera; written by the capture thread, read by diagnostics."""
+"""Counts and rates of one camera's stream; written by the capture thread, read by diagnostics."""
 
 import statistics
 import time
@@ -13,8 +13,8 @@ _WINDOW = 150
 
 
 @dataclass(frozen=True)
-class Snapshot:
-    """The state at one moment. Times are in seconds; NaN where nothing has been measured yet."""
+class CaptureSnapshot:
+    """The state at one moment. Times are in seconds; NaN before the first measurement."""
 
     connected: bool
     ended: bool
@@ -23,7 +23,7 @@ class Snapshot:
     rate_hz: float
     age_s: float
     stamp_to_publish_s: float
-    lost_before_us: int
+    dropped_by_driver: int
     skipped: int
     too_old: int
     corrupt: int
@@ -32,13 +32,13 @@ class Snapshot:
     last_fault: str
 
     def values(self) -> dict[str, object]:
-        """Return the figures by name, for a diagnostic."""
+        """Return the values by name, for a diagnostic."""
         return {
             "frames": self.frames,
             "rate_hz": round(self.rate_hz, 2),
             "age_s": round(self.age_s, 4),
             "stamp_to_publish_ms": round(self.stamp_to_publish_s * 1e3, 3),
-            "lost_before_the_node": self.lost_before_us,
+            "dropped_by_driver": self.dropped_by_driver,
             "dropped_for_newer": self.skipped,
             "dropped_too_old": self.too_old,
             "dropped_corrupt": self.corrupt,
@@ -51,7 +51,7 @@ class Snapshot:
 @dataclass
 class _Counts:
     frames: int = 0
-    lost_before_us: int = 0
+    dropped_by_driver: int = 0
     skipped: int = 0
     too_old: int = 0
     corrupt: int = 0
@@ -59,7 +59,7 @@ class _Counts:
     faults: Counter[str] = field(default_factory=Counter)
 
 
-class Health:
+class CaptureStatistics:
     """Counters that one thread writes and any may read. `now_s` is a steady clock."""
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
@@ -98,7 +98,7 @@ class Health:
         if sequence != self._expected:
             self._counts.skipped += skipped
             if self._expected is not None:
-                self._counts.lost_before_us += max(0, sequence - self._expected - skipped - self._corrupt_since_last)
+                self._counts.dropped_by_driver += max(0, sequence - self._expected - skipped - self._corrupt_since_last)
         self._expected, self._corrupt_since_last = sequence + 1, 0
         self._arrivals_s.append(self._now_s())
 
@@ -115,12 +115,12 @@ class Health:
         """A recording has been played to its end."""
         self._ended, self._connected = True, False
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> CaptureSnapshot:
         """Return the present state."""
         arrivals, delays_s, counts = list(self._arrivals_s), list(self._delays_s), self._counts
         nan = float("nan")
         span = arrivals[-1] - arrivals[0] if len(arrivals) > 1 else 0.0
-        return Snapshot(
+        return CaptureSnapshot(
             connected=self._connected,
             ended=self._ended,
             mode=self._mode,
@@ -128,7 +128,7 @@ class Health:
             rate_hz=(len(arrivals) - 1) / span if span > 0.0 else nan,
             age_s=self._now_s() - arrivals[-1] if arrivals else nan,
             stamp_to_publish_s=statistics.median(delays_s) if delays_s else nan,
-            lost_before_us=counts.lost_before_us,
+            dropped_by_driver=counts.dropped_by_driver,
             skipped=counts.skipped,
             too_old=counts.too_old,
             corrupt=counts.corrupt,

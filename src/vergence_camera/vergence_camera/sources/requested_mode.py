@@ -1,4 +1,4 @@
-"""What was asked of a recording or a stream, and what it is."""
+"""Compares the mode of a recording or stream with the requested one."""
 
 import cv2
 
@@ -10,19 +10,19 @@ _HIGHEST_RATE_HZ = 1000.0
 
 
 def mode_of(capture: cv2.VideoCapture) -> Mode:
-    """Return the mode of what OpenCV's ffmpeg has opened; rate 0 where it states none that can be."""
+    """Return the mode of what OpenCV's ffmpeg has opened; rate 0 where it states none that is plausible."""
     code = fourcc_text(int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).strip("\0").upper()
     width, height = int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)), int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
     rate_hz = float(capture.get(cv2.CAP_PROP_FPS))
     return Mode(code or "?", width, height, rate_hz if 0.0 < rate_hz <= _HIGHEST_RATE_HZ else 0.0)
 
 
-def check_asked(request: ModeRequest, given: Mode, identity: str, kind: str) -> None:
-    """Raise ModeMismatchError, naming both, where format or size are not as asked. `kind` is "recording" or so."""
+def check_requested(request: ModeRequest, given: Mode, identity: str, kind: str) -> None:
+    """Raise ModeMismatchError, naming both, where format or size differ. `kind` is "recording" or so."""
     if request.hard_mismatch(given):
-        raise ModeMismatchError(f"{identity}: asked for {request}, the {kind} is {given}")
+        raise ModeMismatchError(f"{identity}: requested {request}, the {kind} is {given}")
 
 
 def size_alone(request: ModeRequest) -> ModeRequest:
-    """Return what is asked of a source that is decoded anyway: any format and rate of that size."""
+    """Return the request without format and rate, for a source that is decoded anyway."""
     return ModeRequest("", request.width_px, request.height_px)

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from vergence_camera.capture_statistics import CaptureStatistics
 from vergence_camera.errors import UsbBandwidthError, WrongSizeError
 from vergence_camera.frame import Mode
-from vergence_camera.health import Health
 
 
 class Steady:
@@ -21,7 +21,7 @@ class Steady:
 
 def test_rate_age_and_delay() -> None:
     clock = Steady()
-    health = Health(clock)
+    health = CaptureStatistics(clock)
     health.connected(Mode("MJPG", 640, 480, 30.0))
     for number in range(31):
         health.received(number, 0)
@@ -35,26 +35,26 @@ def test_rate_age_and_delay() -> None:
 
 
 def test_nothing_measured_yet_is_nan() -> None:
-    state = Health().snapshot()
+    state = CaptureStatistics().snapshot()
     assert math.isnan(state.rate_hz)
     assert math.isnan(state.age_s)
     assert not state.connected
 
 
 def test_where_frames_were_lost() -> None:
-    health = Health()
+    health = CaptureStatistics()
     health.connected(Mode("MJPG", 640, 480, 30.0))
     health.received(10, 0)  # the first number says nothing
     health.received(13, 1)  # 11 lost before us, 12 dropped for 13
     health.corrupt(WrongSizeError("small"))  # 14
     health.received(15, 0)
     state = health.snapshot()
-    assert (state.lost_before_us, state.skipped, state.corrupt) == (1, 1, 1)
+    assert (state.dropped_by_driver, state.skipped, state.corrupt) == (1, 1, 1)
     assert state.faults == {"wrong_size": 1}
 
 
 def test_a_reconnect_begins_the_sequence_anew() -> None:
-    health = Health()
+    health = CaptureStatistics()
     mode = Mode("MJPG", 640, 480, 30.0)
     health.connected(mode)
     health.received(500, 0)
@@ -63,6 +63,6 @@ def test_a_reconnect_begins_the_sequence_anew() -> None:
     health.connected(mode)
     health.received(700, 0)
     state = health.snapshot()
-    assert (state.lost_before_us, state.reconnects) == (0, 1)
+    assert (state.dropped_by_driver, state.reconnects) == (0, 1)
     assert state.values()["fault.usb_bandwidth"] == 1
     assert state.values()["last_fault"] == "full"
