@@ -75,7 +75,7 @@ class DrawnFeatures:
         focal_px = head.rig.left_camera.fx_px
         angles = np.array([head.reported_rad[name] for name in JOINT_NAMES])
         # One pose has one set of features, whose errors last; a frame adds little of its own.
-        lasting = np.random.default_rng([self._seed, *(np.abs(said) * 1e6).astype(int).tolist()])
+        lasting = np.random.default_rng([self._seed, *(np.abs(angles) * 1e6).astype(int).tolist()])
         passing = np.random.default_rng([self._seed, round(head.time_s * 1e4) + 10**6])
         points = self._points(head, lasting)
         seen = np.array([np.concatenate([head.project(p, left=True), head.project(p, left=False)]) for p in points])
@@ -93,7 +93,7 @@ class DrawnFeatures:
             distortion=PARAMETERS.prior.distortion_sigma,
             centre_rad=PARAMETERS.prior.centre_sigma_px / focal_px,
         )
-        found = relative_rotation(views[0], views[1], float(said[0]), float(said[1]), prior)
+        found = relative_rotation(views[0], views[1], float(angles[0]), float(angles[1]), prior)
         return EyeRotationObservation(head.time_s, 0.0, found.vergence_rad, found.sigma_rad)
 
     @staticmethod

@@ -62,7 +62,9 @@ class Head:
         k = [camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0]
         for publisher in self.infos:
             publisher.publish(
-                CameraInfo(width=640, height=480, k=k, d=list(SIMULATED.camera.distortion), distortion_model="plumb_bob")
+                CameraInfo(
+                    width=640, height=480, k=k, d=list(SIMULATED.camera.distortion), distortion_model="plumb_bob"
+                )
             )
 
     def show(self, left: npt.NDArray[np.uint8], right: npt.NDArray[np.uint8], turn_rad: float = 0.0) -> None:
@@ -161,7 +163,8 @@ def test_without_camera_info_the_message_has_no_angles(head: Head, seen: StereoF
 
 
 def test_what_the_servos_cannot_be_is_contradictory_and_a_diagnostic(graph: Any, seen: StereoFrame) -> None:
-    head = Head(graph, **{"acceptance.mount_tolerance_rad": 0.001})
+    tolerance: dict[str, Any] = {"acceptance.mount_tolerance_rad": 0.001}
+    head = Head(graph, **tolerance)
     head.said_rad["pan_right"] -= 0.018
     message = head.until(EyeRotation.STATUS_CONTRADICTORY, seen.left, seen.right)
     assert "servos and mounts allow" in message.reason
