@@ -22,7 +22,7 @@ def simulator():
     assert station.place_m is not None
     assert station.distractor_m is not None
     simulator.place_target(station.target, station.place_m)
-    simulator.place_distractor(station.distractor_m)
+    simulator.place_object("distractor", station.distractor_m)
     yield simulator
     simulator.close()
 

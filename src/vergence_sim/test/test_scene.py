@@ -146,9 +146,9 @@ def test_the_distractor_goes_where_it_is_put_and_is_no_target(kind):
     simulator = Simulator(SimParameters.ideal({"world.distractor": kind}), render=False)
     simulator.place_target("cube", (0.8, 0.0, 0.0))
     boxes, truth = simulator.true_boxes("left"), simulator.truth()
-    simulator.place_distractor((0.4, -0.1, 0.0))
+    simulator.place_object("distractor", (0.4, -0.1, 0.0))
     assert simulator.true_boxes("left") == boxes
     assert simulator.truth().left_visible_share == truth.left_visible_share
-    simulator.place_distractor((0.4, 0.02, 0.0))
+    simulator.place_object("distractor", (0.4, 0.02, 0.0))
     assert simulator.truth().left_visible_share < 0.5 < truth.left_visible_share
     assert simulator.truth().target == "cube"

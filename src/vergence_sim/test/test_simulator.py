@@ -72,9 +72,9 @@ def test_an_occluder_hides_the_target(blind):
     blind.set_head({"pan_left": 0.0, "pan_right": 0.0, "tilt": 0.0})
     blind.place_target("cube", (1.0, 0.0, 0.0))
     assert blind.truth().left_visible_share == 1.0
-    blind.place_occluder((0.5, 0.0, 0.0))
+    blind.place_object("occluder", (0.5, 0.0, 0.0))
     hidden = blind.truth()
-    blind.place_occluder((0.0, 0.0, -5.0))
+    blind.place_object("occluder", (0.0, 0.0, -5.0))
     assert hidden.left_visible_share == hidden.right_visible_share == 0.0
     assert math.isnan(hidden.mean_disparity_px)
     assert blind.truth().left_visible_share == 1.0

@@ -154,9 +154,6 @@ class SceneBuilder(ModelBuilder):
     def _wrapped(self, name: str, images: list[Image]) -> str:
         return self.wrap(name, images) if self.textured else name
 
-    def _cubic(self, name: str, images: list[Image]) -> None:
-        self.wrap(name, images)
-
     def _hidden(
         self,
         kind: str,

@@ -128,8 +128,8 @@ class Simulator:
     def place_object(self, name: str, point_m: Sequence[float] | Array) -> None:
         """Place any movable object's centre in rig_base (3,) [m]; which one is the target stays as it is.
 
-        Objects are both targets, `occluder`, `distractor`, and as many of `cube2`, `cube3`, `cube4` as
-        `world.extra_cubes` says. An object below the floor is hidden.
+        Both targets, `occluder` (an upright board of 18 by 24 cm), `distractor` (a box 6 cm wide in the cube's
+        colours), and as many of `cube2`, `cube3`, `cube4` as `world.extra_cubes` says. Below the floor they are hidden.
         """
         place = np.asarray(point_m, np.float64)
         if name not in OBJECTS or mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, name) < 0:
@@ -138,14 +138,6 @@ class Simulator:
             raise TargetError(f"place of {name} must be three finite numbers [m]: got {point_m!r}")
         self._places[name] = place
         self._update()
-
-    def place_occluder(self, point_m: Sequence[float] | Array) -> None:
-        """Place the occluder, an upright board 18 by 24 cm, in rig_base (3,) [m]."""
-        self.place_object("occluder", point_m)
-
-    def place_distractor(self, point_m: Sequence[float] | Array) -> None:
-        """Place the distractor, a box 6 cm wide in the cube's colours, in rig_base (3,) [m]."""
-        self.place_object("distractor", point_m)
 
     def view(self, eye: str) -> Image:
         """Return the image that one eye, "left" or "right", takes now: (h, w, 3) BGR uint8."""

@@ -1,7 +1,6 @@
 """Procedural surfaces: paint, brick, planks, cloth, card. Rich at every scale, never repeating, seeded.
 
-Every function returns (h, w, 3) uint8 BGR. `mean_gradient` states how much structure a surface has; a surface for a
-room has at least `LEAST_GRADIENT`, enough texture for a stereo matcher.
+Every function returns (h, w, 3) uint8 BGR with enough texture for a stereo matcher.
 """
 
 import itertools
@@ -13,9 +12,6 @@ import numpy.typing as npt
 Image = npt.NDArray[np.uint8]
 Field = npt.NDArray[np.float32]
 Colour = tuple[float, float, float]
-
-LEAST_GRADIENT = 1.5
-"""Mean magnitude of the grey gradient of every surface here, at least [grey levels a pixel]."""
 
 
 def cloud(rng: np.random.Generator, shape: tuple[int, int], octaves: int = 7, roughness: float = 0.6) -> Field:
@@ -51,13 +47,6 @@ def muted(rng: np.random.Generator, darkest: float, lightest: float, spread: flo
 def shaded(base: Colour | npt.NDArray, shade: Field) -> Image:
     """Return a colour or an image (h, w, 3) with `shade` grey levels added."""
     return np.clip(np.asarray(base, np.float32) + shade[:, :, None], 0, 255).astype(np.uint8)
-
-
-def mean_gradient(image: Image) -> float:
-    """Return the mean magnitude of an image's grey gradient (Sobel 3x3 over 8) [grey levels a pixel]."""
-    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
-    x, y = cv2.Sobel(grey, cv2.CV_32F, 1, 0, scale=0.125), cv2.Sobel(grey, cv2.CV_32F, 0, 1, scale=0.125)
-    return float(np.hypot(x, y).mean())
 
 
 def plaster(rng: np.random.Generator, shape: tuple[int, int], base: Colour) -> Image:
