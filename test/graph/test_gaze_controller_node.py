@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 from vergence_common.stamps import to_stamp
-from vergence_gaze.estimation.observations import EdgeJudgement, FoveaDisparity, JointReport, TrackSighting
+from vergence_gaze.estimation.observations import EdgeContrast, FoveaDisparity, JointReport, TrackSighting
 from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_msgs.action import LookAt
@@ -87,7 +87,7 @@ class HeadNode(Node):
             message = JointState(name=list(seen.positions_rad), position=list(seen.positions_rad.values()))
             message.header.stamp = self._stamp(seen.stamp_s)
             self._joints.publish(message)
-        elif isinstance(seen, EdgeJudgement):
+        elif isinstance(seen, EdgeContrast):
             edge = EdgeVergence(windows_px=[50, 300], contrast=[seen.contrast, 1.0])
             edge.left_to_right_px = edge.right_to_left_px = [seen.metric_px, 9.0]
             edge.header.stamp = self._stamp(seen.stamp_s)
@@ -224,7 +224,7 @@ def test_goals_that_cannot_be_say_why(scene: Scene) -> None:
     behind.point.x, behind.point.y = -1.0, 0.2
     result = scene.result(scene.send(behind))
     assert result.result == LookAt.Result.UNREACHABLE
-    assert "allowed is" in result.reason
+    assert "must be" in result.reason
     elsewhere = LookAt.Goal(kind=LookAt.Goal.POINT)
     elsewhere.header.frame_id = "moon"
     result = scene.result(scene.send(elsewhere))
@@ -257,11 +257,11 @@ def test_a_streamed_target_is_followed(scene: Scene) -> None:
 
 def test_parameters_are_taken_at_run_time_and_refused_when_wrong(scene: Scene) -> None:
     good, bad = scene.node.set_parameters(
-        [Parameter("mode", value="left_held"), Parameter("saccade_threshold_rad", value=-1.0)]
+        [Parameter("mode", value="left_held"), Parameter("saccade.threshold_rad", value=-1.0)]
     )
     assert good.successful
     assert not bad.successful
-    assert "saccade_threshold_rad" in bad.reason
+    assert "saccade.threshold_rad" in bad.reason
     scene.until(lambda: scene.states[-1].mode == "left_held", "the mode is taken")
 
 

@@ -45,7 +45,7 @@ class Controllers:
         for name in self._that_can_be():
             state = self._state
             idle = state is not None and state.phase == GazeState.PHASE_IDLE
-            disabled = idle and state is not None and state.reason == "disabled"
+            disabled = idle and state is not None and state.reason.startswith("disabled")
             self.silenced.append(Silenced(name, idle, disabled))  # first: whoever interrupts this wakes it all the same
             answer = call(self._node, SetBool, f"{name}/enable", SetBool.Request(data=False))
             if answer is None or not answer.success:

@@ -137,8 +137,8 @@ class GazeController:
         """Disable: hold still and send nothing. Enable: without a goal, verge on what the left eye sees."""
         self._enabled = enabled
         if not enabled:
-            self._goals.end(Result.CANCELLED, "the controller is disabled", now_s)
-            self._hold("the controller is disabled", now_s)
+            self._goals.end(Result.CANCELLED, "disabled: the eyes hold still, no commands are sent", now_s)
+            self._hold("disabled: the eyes hold still, no commands are sent", now_s)
             self._send_until_s = -math.inf
         elif not self._active:
             self._active = self._verges_on_sight = True

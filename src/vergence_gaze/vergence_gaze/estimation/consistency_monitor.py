@@ -90,7 +90,7 @@ class ConsistencyMonitor:
         self._track_off.update(vergence_rad, self._track, stamp_s)
 
     def fovea_inconsistent(self, stamp_s: float) -> bool:
-        """Return whether, by the boxes, the fovea looks past the target."""
+        """Return whether, by the boxes, the object at the fovea is not the target."""
         return self._boxes_are_fresh(stamp_s) and self._fovea_off.beyond(self._box_own_depth_rad, self._box_sigma_rad)
 
     def track_inconsistent(self, stamp_s: float) -> bool:

@@ -1,4 +1,4 @@
-"""How surely one pair shows that the eyes are on the target, given the error predicted before it."""
+"""The probability that the eyes are off the target although a pair shows them on it, given the prediction."""
 
 import math
 from dataclasses import dataclass

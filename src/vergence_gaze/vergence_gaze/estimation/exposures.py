@@ -52,8 +52,8 @@ class Exposures:
         """Return whether the target was at the left fovea."""
         if target is None:
             return False
-        joints, wanted = self._history.shaft_at(stamp_s), target.joints_rad
-        return math.hypot(wanted[0] - joints[0], wanted[2] - joints[2]) <= self._p.target.fovea_radius_rad
+        joints, target_rad = self._history.shaft_at(stamp_s), target.joints_rad
+        return math.hypot(target_rad[0] - joints[0], target_rad[2] - joints[2]) <= self._p.target.fovea_radius_rad
 
 
 def positive_sigma(sigma_rad: float, fallback_rad: float) -> float:

@@ -22,7 +22,7 @@ _RATE_HOLDS_S = 0.15
 
 @dataclass(frozen=True)
 class Measurement:
-    """Linear measurements of one pair: row i says coefficients[i] @ state(t) = values[i] +- sigmas[i].
+    """Linear measurements of one pair: row i is coefficients[i] @ state(t) = values[i] +- sigmas[i].
 
     `coefficients` (n, 3) are for version, vergence, tilt; `stamps_s` (n,) the exposure that each belongs to.
     """

@@ -57,7 +57,7 @@ class TrackLock:
         if abs(vergence_off_rad) > _GATE_SIGMA * float(estimate.sigmas_rad[1]) + depth_margin_rad:
             deeper_deg = math.degrees(vergence_off_rad)
             return f"the tracker follows an object whose vergence is {deeper_deg:.1f} deg off the target's"
-        # The first lock after a click keeps the click. A tracker that did not lock anew because the move was small
+        # The first lock after a click keeps the click. A tracker that did not lock again because the move was small
         # still follows its old target next to it.
         first = self.track_id is None
         self.offset, self._compared = (offset, 1) if first else (np.zeros(2), 0)

@@ -66,7 +66,7 @@ class MetricDescentLaw:
         self.reset()
 
     def reset(self) -> None:
-        """Begin with a sweep."""
+        """Start with a sweep."""
         self._inverse.reset()
         self._sweep: list[tuple[float, float]] = []
         self._vergence_rad = math.nan

@@ -162,13 +162,13 @@ class PidPursuitLaw:
             errors = np.nan_to_num(seen - (self._place + self._speed * interval_s))
             off = np.nan_to_num(seen + self._speed * (state.now_s - visual.stamp_s) - _axes(state.shaft_rad))
             self._slope = (off - self._errors) / interval_s
-            learns = (np.abs(errors) < p.integrated_error_rad) & (np.abs(off) < p.integrated_error_rad)
+            integrates = (np.abs(errors) < p.integrated_error_rad) & (np.abs(off) < p.integrated_error_rad)
             change = np.nan_to_num(seen - self._place) / interval_s - self._seen_speed
             correction = np.where(np.abs(change) < p.jump_speed_rad_s, p.seen_speed_share * change, 0.0)
             self._seen_speed = self._seen_speed + correction
             # On the way to a target at rest the integral would hold its own error for the target's speed.
             speed = np.clip(
-                self._speed + np.where(learns, self._ki * off * interval_s, 0.0),
+                self._speed + np.where(integrates, self._ki * off * interval_s, 0.0),
                 self._seen_speed - p.integral_margin_rad_s,
                 self._seen_speed + p.integral_margin_rad_s,
             )
