@@ -57,7 +57,7 @@ def test_the_simulated_head_is_the_whole_graph_on_one_rig(tmp_path):
 
 
 def test_the_doctor_looks_for_every_node(monkeypatch):
-    asked = []
+    asked: list[str] = []
     monkeypatch.setattr("vergence_bringup.commands.doctor.find_node", asked.append)
     (finding,) = (finding for finding in examine(render=False) if finding.name == "nodes")
     assert asked == list(NODES)
