@@ -14,10 +14,11 @@ from bench.gaze_figures import DEFAULT
 from bench.gaze_runs import SERVOS, Setting
 from bench.gaze_table import table
 from bench.results import Row
+from vergence_gaze.law_registry import law_names
 
 __all__ = ["run", "table"]
 
-LAWS = ("predictive", "pd_bangbang", "pid_pursuit", "metric_descent")
+LAWS = law_names()
 LATENCIES_MS = (30, 60, 120)
 Part = Callable[[Setting], list[Row]]
 
