@@ -71,7 +71,7 @@ def test_files_of_both_eyes_give_three_yamls_and_reasons(tmp_path: Path) -> None
         *("--board", "6x4", "--square-m", "0.02", "--out", str(tmp_path / "out")),
     )
     assert status == 0
-    assert "[1/8] left0.png + right0.png: taken" in text
+    assert "[1/8] left0.png + right0.png: accepted" in text
     assert "shows the same as left0.png + right0.png" in text
     assert "left: no chessboard of 6x4" in text
     assert "cannot be read" in text
@@ -93,7 +93,7 @@ def test_one_eye_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda left, right: ["--left", *left, "--right", *right[1:]], "5 left and 4 right"),
+        (lambda left, right: ["--left", *left, "--right", *right[1:]], "got 5 and 4"),
         (lambda left, right: ["--left", *left[:2]], "at least 3"),
         (lambda left, right: ["--left", *left, "--board", "six"], "COLUMNSxROWS"),
         (lambda left, right: ["--left", *left, "--square-m", "-1"], "square_m"),
@@ -126,7 +126,7 @@ def test_the_published_set(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("compressed", [True, False])
-def test_live_views_are_taken_when_the_board_is_still_and_somewhere_new(graph: Any, compressed: bool) -> None:
+def test_live_views_are_accepted_when_the_board_is_still_and_somewhere_new(graph: Any, compressed: bool) -> None:
     kind, suffix = (CompressedImage, "image_raw/compressed") if compressed else (Image, "image_raw")
     topics = {eye: f"{eye}/{suffix}" for eye in ("left", "right")}
     collector = ViewCollector(Chessboard(6, 4, 0.02), least_change=0.04)
@@ -159,6 +159,6 @@ def test_live_views_are_taken_when_the_board_is_still_and_somewhere_new(graph: A
     show(60, 40)
     assert len(collector.views) == 2
     graph.wait(node.done)
-    assert "[2/2] taken" in said[-1]
+    assert "[2/2] view accepted" in said[-1]
     assert "covered" in said[-1]
     assert len(collector.verdicts) == 2

@@ -37,7 +37,7 @@ class LiveViews(Node):
         say: Callable[[str], None],
         **node_options: Any,
     ) -> None:
-        super().__init__("calibrate_receivedras", **node_options)
+        super().__init__("calibrate_cameras", **node_options)
         self._collector, self._wanted, self._max_skew_s, self._say = collector, wanted, max_skew_s, say
         self._newest: dict[str, tuple[float, Picture]] = {}
         self._previous: dict[str, Detection] = {}
