@@ -74,7 +74,7 @@ def test_files_of_both_eyes_give_three_yamls_and_reasons(tmp_path: Path) -> None
     assert "[1/8] left0.png + right0.png: accepted" in text
     assert "shows the same as left0.png + right0.png" in text
     assert "left: no chessboard of 6x4" in text
-    assert "cannot be read" in text
+    assert "not readable as images" in text
     assert "8 views offered, 3 rejected" in text
     assert "coverage" in text
     assert load_calibration(tmp_path / "out" / "left.yaml").width_px == 320
