@@ -58,7 +58,7 @@ def test_offset_and_roll_are_found_whatever_the_disparity(
     assert math.degrees(found.roll_rad) == pytest.approx(roll_deg, abs=0.1)
 
 
-def test_what_is_taken_out_is_gone_and_the_centre_keeps_its_column() -> None:
+def test_offset_and_roll_are_removed_and_the_centre_keeps_its_column() -> None:
     left, right = pair(-9.0, 1.5, disparity_px=0.0, noise=0.0)
     aligned = auto().update(left, right).apply(right)
     middle = (slice(120, 360), slice(160, 480))
@@ -70,7 +70,7 @@ def test_what_is_taken_out_is_gone_and_the_centre_keeps_its_column() -> None:
     assert again.roll_rad == pytest.approx(0.0, abs=1e-3)
 
 
-def test_convergence_is_not_taken_for_roll() -> None:
+def test_convergence_is_not_measured_as_roll() -> None:
     """Eyes turned inwards see keystones: the vertical offset grows with x times y and is zero on both axes."""
     left, right = pair(0.0, 0.0, 0.0)
     columns, rows = np.meshgrid(np.arange(640, dtype=np.float32), np.arange(480, dtype=np.float32))
@@ -81,7 +81,7 @@ def test_convergence_is_not_taken_for_roll() -> None:
     assert math.degrees(found.roll_rad) == pytest.approx(0.0, abs=0.1)
 
 
-def test_larger_than_allowed_is_clipped_and_said() -> None:
+def test_a_larger_estimate_is_clipped_and_marked_as_bounded() -> None:
     found = auto(max_vertical_px=5.0, max_roll_rad=math.radians(1.0)).update(*pair(6.5, 1.6))
     assert found.bounded
     assert found.vertical_px == 5.0
@@ -99,7 +99,7 @@ def test_unrelated_or_blank_images_change_nothing() -> None:
     assert aligner.update(pair(0, 0)[0], blank).vertical_px == before.vertical_px
 
 
-def test_one_odd_pair_is_left_out_and_a_lasting_change_is_taken() -> None:
+def test_one_outlier_is_rejected_and_a_lasting_change_is_followed() -> None:
     aligner = auto(every_pairs=1)
     for seed in range(3):
         filtered = aligner.update(*pair(3.0, 0.0, seed=seed))
@@ -118,7 +118,7 @@ def test_none_and_calibrated_do_as_they_say() -> None:
     assert (given.vertical_px, given.roll_rad) == (4.0, math.radians(1.0))
 
 
-def test_a_point_goes_back_to_where_it_was_taken() -> None:
+def test_a_point_returns_to_its_position_in_the_original_image() -> None:
     alignment = Alignment("calibrated", 7.0, math.radians(2.0))
     dot = np.zeros((101, 141), np.uint8)
     dot[30, 100] = 255

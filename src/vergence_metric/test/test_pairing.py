@@ -196,7 +196,7 @@ def test_one_camera_restarts_and_pairs_again() -> None:
     assert subject.statistics.resets == 0
 
 
-def test_says_why_it_never_pairs() -> None:
+def test_statistics_give_the_reason_why_there_is_no_pair() -> None:
     subject = pairer(slop_ms=10.0)
     fed(subject, [(side, i * PERIOD_NS + side * 14 * MS) for i in range(20) for side in (LEFT, RIGHT)])
     assert subject.statistics.pairs == 0
@@ -205,7 +205,7 @@ def test_says_why_it_never_pairs() -> None:
     )
 
 
-def test_says_nothing_while_it_pairs_or_one_eye_is_silent() -> None:
+def test_statistics_give_no_reason_while_there_are_pairs_or_one_stream_has_no_frames() -> None:
     subject = pairer()
     fed(subject, [(LEFT, i * PERIOD_NS) for i in range(40)])
     assert subject.statistics.complaint(0.02) is None

@@ -116,7 +116,7 @@ def test_any_pans_inside_the_dead_band_are_read_within_the_stated_deviation(
     assert abs(reading.rotation.vergence_rad - vergence) < 4.0 * reading.rotation.sigma_rad < math.radians(0.4)
 
 
-def test_exposures_of_different_brightness_and_colour_images_read_alike() -> None:
+def test_exposures_of_different_brightness_and_colour_images_give_the_same_reading() -> None:
     left, right = view(True, -0.03, 2.0), view(False, 0.03, 2.0)
     encoder = VisualEncoder(EncoderParameters(), RIG)
     eyes = EyeAngles(-0.03, 0.03, 0.0)
