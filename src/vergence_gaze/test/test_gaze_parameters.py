@@ -1,11 +1,26 @@
-"""Parameters by full name: hystereses in order, names and values checked, former names with their new ones."""
+"""Parameters by full name: shipped YAML, hystereses in order, names and values checked, former names."""
+
+from pathlib import Path
 
 import pytest
+import yaml
 
 from vergence_gaze.law_registry import law_groups, law_names
 from vergence_gaze.parameter_groups import GROUPS, gaze_parameters
 from vergence_gaze.parameters import TargetParameters
 from vergence_rig.parameters import ParameterError, renamed
+
+YAML = Path(__file__).resolve().parents[3] / "config" / "gaze_controller_node.yaml"
+
+
+def test_shipped_yaml_equals_the_defaults() -> None:
+    shipped = yaml.safe_load(YAML.read_text(encoding="utf-8"))["/**"]["ros__parameters"]
+    flat = {}
+    for name, value in shipped.items():
+        inner = value if isinstance(value, dict) else {"": value}
+        flat |= {f"{name}.{leaf}".rstrip("."): setting for leaf, setting in inner.items()}
+    assert gaze_parameters(flat) == gaze_parameters()
+    assert set(flat) == {prefix + spec.name for prefix, kind in GROUPS for spec in kind.specs()}
 
 
 @pytest.mark.parametrize(
