@@ -47,7 +47,7 @@ def draw_overlay(left: NDArray[Any], result: EdgeMetricResult, disparity: Dispar
 def overlay_lines(result: EdgeMetricResult, disparity: Disparity) -> list[str]:
     """Return the lines of text: the signed error, then each window's metric."""
     if math.isfinite(disparity.horizontal_px):
-        error = f"error {disparity.horizontal_px:+.1f} px, {disparity.confidence:.0%} sure"
+        error = f"error {disparity.horizontal_px:+.1f} px, {disparity.confidence:.0%} confidence"
     else:
         error = f"error unknown: {disparity.reason}"
     lines = [error]
