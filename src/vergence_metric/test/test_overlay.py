@@ -56,7 +56,9 @@ def test_the_disparity_is_an_arrow_only_where_there_is_one() -> None:
     assert rows.size
 
 
-@pytest.mark.parametrize(("disparity", "first"), [(GOOD, "error +12.0 px, 97% confidence"), (NONE, "error unknown: blank")])
+@pytest.mark.parametrize(
+    ("disparity", "first"), [(GOOD, "error +12.0 px, 97% confidence"), (NONE, "error unknown: blank")]
+)
 def test_lines_show_the_error_and_every_window(disparity: Disparity, first: str) -> None:
     result = EdgeMetric(EdgeParameters(windows_px=(50, 200))).measure(box(140), box(148))
     lines = overlay_lines(result, disparity)
