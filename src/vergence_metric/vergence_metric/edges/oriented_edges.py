@@ -132,8 +132,8 @@ def oriented_field(
     """Return the oriented edges of a pair, with distances up to `truncation_px`.
 
     `bins` directions over 360 degrees with `signed`, which distinguishes dark-to-bright from bright-to-dark, else over
-    180; the first is centred on horizontal gradients. Neighbours may lie outside a window: unlike the paper's metric this one only
-    reaches `truncation_px`, and edges cut off by a window's border would only add noise.
+    180; the first is centred on horizontal gradients. Neighbours may lie outside a window: unlike
+    the paper's metric this one only reaches `truncation_px`, and edges cut off by a window's border would add noise.
     With `scratch` the memory is taken from there: the field is then good until the next one made with it.
     """
     if not 1 <= truncation_px <= MAX_TRUNCATION_PX or not 1 <= bins <= MAX_BINS:
