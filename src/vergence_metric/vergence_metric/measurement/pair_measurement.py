@@ -10,9 +10,10 @@ from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
+from vergence_metric.tracking.protocol import Tracker
+from vergence_metric.tracking.registry import make_tracker
 from vergence_metric.tracking.saccade_detector import StampedEyeAngles
 from vergence_metric.tracking.track import Track, TrackStatus
-from vergence_metric.tracking.tracker import TargetTracker
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import Rig
@@ -26,7 +27,7 @@ class PairMeasurement:
     def __init__(self, parameters: PairMeasurementParameters, rig: Rig) -> None:
         self._baseline_m = rig.baseline_m
         self._rig_models = (CameraModel(rig.left_camera), CameraModel(rig.right_camera))
-        self._tracker: TargetTracker | None = None
+        self._tracker: Tracker | None = None
         self._models: Models | None = None
         self._ids_used = 0
         self._newest_id = 0
@@ -95,7 +96,7 @@ class PairMeasurement:
             return self._unlocked("no joint_states at the image's stamp")
         if self._tracker is None or models != self._models:
             self._models, self._ids_used = models, self._newest_id
-            self._tracker = TargetTracker(self._parameters.tracker, self._estimator, *models, self._baseline_m)
+            self._tracker = make_tracker(self._parameters.tracker, self._estimator, *models, self._baseline_m)
         track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes, samples)
         self._newest_id = self._ids_used + track.track_id
         return replace(track, track_id=self._newest_id)

@@ -1,0 +1,22 @@
+"""What a tracker is."""
+
+from collections.abc import Iterable
+from typing import Protocol
+
+from vergence_metric.disparity.protocol import Image
+from vergence_metric.tracking.saccade_detector import StampedEyeAngles
+from vergence_metric.tracking.track import Track
+from vergence_rig.geometry import EyeAngles
+
+
+class Tracker(Protocol):
+    """Follows one target from pair to pair.
+
+    Built as `build(parameters, estimator, left_camera, right_camera, baseline_m)`, anew whenever one of these changes.
+    """
+
+    def update(
+        self, left: Image, right: Image, stamp_s: float, eyes: EyeAngles, samples: Iterable[StampedEyeAngles] = ()
+    ) -> Track:
+        """Return where the target is in a pair; see `tracker.TargetTracker.update`."""
+        ...
