@@ -15,7 +15,7 @@ YAML = Path(__file__).resolve().parents[3] / "config" / "gaze_controller_node.ya
 
 def test_shipped_yaml_equals_the_defaults() -> None:
     shipped = yaml.safe_load(YAML.read_text(encoding="utf-8"))["/**"]["ros__parameters"]
-    flat = {}
+    flat: dict[str, object] = {}
     for name, value in shipped.items():
         inner = value if isinstance(value, dict) else {"": value}
         flat |= {f"{name}.{leaf}".rstrip("."): setting for leaf, setting in inner.items()}
