@@ -1,4 +1,4 @@
-"""How well `vergence identify` finds what the simulator was told: the table of docs/identify.md.
+"""How well `vergence identify` finds what the simulator was commanded: the table of docs/identify.md.
 
     python tools/identify_study.py            every row, some minutes
     python tools/identify_study.py 1          only the first
@@ -27,7 +27,7 @@ from vergence_sim.simulator import Simulator
 
 @dataclass(frozen=True)
 class Case:
-    """What the simulator is told."""
+    """What the simulator is commanded."""
 
     name: str
     parameters: SimParameters
@@ -116,7 +116,7 @@ def row(case: Case) -> str:
         if timing.speed_known
     ]
     head.simulator.close()
-    speed = f"{100 * _worst(speeds):+.0f} % ({len(speeds)} of 4 told)" if speeds else "none told"
+    speed = f"{100 * _worst(speeds):+.0f} % ({len(speeds)} of 4 commanded)" if speeds else "none commanded"
     return (
         f"| {case.name} | {1e3 * _worst([error for error, _ in errors]):+.1f} ms "
         f"({_worst([e / s for e, s in errors]):+.1f} sigma) | {1e3 * _worst(late):+.1f} ms | "

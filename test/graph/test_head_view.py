@@ -23,7 +23,7 @@ pytestmark = pytest.mark.graph
 
 
 class GreyHead(Node):
-    """Publishes both eyes' images, as bright as pan_left was last told in degrees."""
+    """Publishes both eyes' images, as bright as pan_left was last commanded in degrees."""
 
     def __init__(self, context: Context, listens: bool) -> None:
         super().__init__("grey_head", context=context)
@@ -94,7 +94,7 @@ def test_images_are_from_after_the_move(start_head: Callable[[bool], GreyHead]):
 def test_nobody_to_command_and_rivals_are_named(
     start_head: Callable[[bool], GreyHead], monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(head_view_node, "_PATIENCE_S", 0.5)
+    monkeypatch.setattr(head_view_node, "_TIMEOUT_S", 0.5)
     node = start_head(False)
     with HeadView() as view:
         with pytest.raises(HeadError, match="start servo_node"):

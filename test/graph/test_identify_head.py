@@ -29,11 +29,11 @@ from vergence_servo.ros.servo_node import ServoNode
 
 pytestmark = pytest.mark.graph
 
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 
 
 class PaleHead(Node):
-    """Publishes both eyes' images, joint_states of what it is told, and has the parameters that owners have."""
+    """Publishes both eyes' images, joint_states of what it is commanded, and has the parameters that owners have."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class PaleHead(Node):
     ) -> None:
         super().__init__("pale_head", context=context)
         self.position = {"pan_left": -0.1, "pan_right": 0.1, "tilt": 0.05}
-        self.told: list[dict[str, float]] = []
+        self.commanded: list[dict[str, float]] = []
         self._compressed, self._age_s = compressed, stamp_age_s
         self.declare_parameter("stamp_offset_s", 0.003)
         self.declare_parameter("command_latency_s", 0.015)
@@ -61,7 +61,7 @@ class PaleHead(Node):
 
     def _on_command(self, message: JointState) -> None:
         self.position |= dict(zip(message.name, message.position, strict=True))
-        self.told.append(dict(self.position))
+        self.commanded.append(dict(self.position))
 
     def _show(self) -> None:
         stamp = self.get_clock().now() - rclpy.duration.Duration(seconds=self._age_s)
@@ -119,7 +119,7 @@ def start(domain_id: int) -> Iterator[Start]:
 
 
 def wait_for(condition: Callable[[], bool], what: str) -> None:
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     while not condition():
         assert time.monotonic() < deadline_s, f"never: {what}"
         time.sleep(0.02)
@@ -128,9 +128,9 @@ def wait_for(condition: Callable[[], bool], what: str) -> None:
 @pytest.mark.parametrize("compressed", [False, True])
 def test_moves_are_recorded_and_the_head_is_left_where_it_was(start: Start, compressed: bool) -> None:
     node = start(PaleHead, compressed=compressed)
-    with IdentifiedHead(default_rig(), patience_s=PATIENCE_S) as head:
+    with IdentifiedHead(default_rig(), timeout_s=TIMEOUT_S) as head:
         assert head.begin() == []
-        wait_for(lambda: len(head.heard_models()) == 1, "camera_info")
+        wait_for(lambda: len(head.published_models()) == 1, "camera_info")
         cameras = head.cameras()
         assert {eye: camera.calibrated for eye, camera in cameras.items()} == {"left": True, "right": False}
         assert (cameras["left"].model.fx_px, cameras["right"].model.fx_px) == (50.0, 539.0)
@@ -138,9 +138,9 @@ def test_moves_are_recorded_and_the_head_is_left_where_it_was(start: Start, comp
         log = head.record("tilt", moves)
         owners = head.owners()
     assert log.commands[:, 1].tolist() == [-0.02, 0.03]
-    assert next(told["tilt"] for told in node.told if told["tilt"] != 0.05) == pytest.approx(0.03)
-    assert max(told["tilt"] for told in node.told) == pytest.approx(0.08)
-    assert all(told["pan_left"] == pytest.approx(-0.1) for told in node.told)
+    assert next(commanded["tilt"] for commanded in node.commanded if commanded["tilt"] != 0.05) == pytest.approx(0.03)
+    assert max(commanded["tilt"] for commanded in node.commanded) == pytest.approx(0.08)
+    assert all(commanded["pan_left"] == pytest.approx(-0.1) for commanded in node.commanded)
     assert node.position == pytest.approx({"pan_left": -0.1, "pan_right": 0.1, "tilt": 0.05})
     assert set(np.round(log.reports[:, 1], 6)) >= {0.03, 0.08}
     for eye in EYES:
@@ -164,14 +164,14 @@ def test_a_controller_is_silenced_and_gets_its_way_back(start: Start, before: st
     if before == "disabled":
         controller._controller.enable(False, 0.0)
     wait_for(lambda: bool(states) and (states[-1].phase == GazeState.PHASE_IDLE) == (before != "verging"), before)
-    with IdentifiedHead(default_rig(), patience_s=PATIENCE_S) as head:
-        wait_for(lambda: head._controllers._state is not None, "gaze/state heard")
+    with IdentifiedHead(default_rig(), timeout_s=TIMEOUT_S) as head:
+        wait_for(lambda: head._controllers._state is not None, "gaze/state published")
         wait_for(lambda: head._controllers.others() == ["/gaze_controller_node"], "the controller known")
         assert head.begin() == ["/gaze_controller_node"]
         assert not controller._controller._enabled
-        count = len(node.told)
+        count = len(node.commanded)
         head.record("pan_left", [Move(0.02, 0.2, 0.0)])
-        assert len(node.told) > count
+        assert len(node.commanded) > count
     if before == "disabled":
         assert not controller._controller._enabled
         return
@@ -186,8 +186,10 @@ def test_somebody_elses_commands_are_refused_with_a_name(start: Start) -> None:
     rival.create_timer(0.02, lambda: publisher.publish(JointState(name=["tilt"], position=[0.2])))
     wait_for(lambda: publisher.get_subscription_count() > 0, "matched")
     with (
-        pytest.raises(IdentifyError, match=r"joint_command has \d+ commands of somebody else \(/stubborn\)"),
-        IdentifiedHead(default_rig(), patience_s=PATIENCE_S) as head,
+        pytest.raises(
+            IdentifyError, match=r"joint_command must have no commands of other nodes .* got \d+ of /stubborn"
+        ),
+        IdentifiedHead(default_rig(), timeout_s=TIMEOUT_S) as head,
     ):
         head.begin()
 
@@ -195,22 +197,22 @@ def test_somebody_elses_commands_are_refused_with_a_name(start: Start) -> None:
 @pytest.mark.parametrize(
     ("options", "error", "text"),
     [
-        ({"listens": False}, HeadError, "nobody takes joint_command: start servo_node"),
+        ({"listens": False}, HeadError, "no node subscribes to joint_command: start servo_node"),
         ({"sees": False}, IdentifyError, "no images on left/image_raw and right/image_raw for 2 s"),
-        ({"stamp_age_s": 100.0}, IdentifyError, r"left/image_raw has stamps 10\d\.\d s old: allowed is -0\.2 to 5 s"),
+        ({"stamp_age_s": 100.0}, IdentifyError, r"stamps of left/image_raw must be -0\.2 to 5 s old: got 10\d\.\d s"),
     ],
 )
 def test_heads_that_cannot_be_used_are_refused(
     start: Start, options: dict[str, Any], error: type[Exception], text: str
 ) -> None:
     start(PaleHead, **options)
-    patience_s = 2.0 if "listens" in options else PATIENCE_S
-    with IdentifiedHead(default_rig(), patience_s=patience_s) as head:
+    timeout_s = 2.0 if "listens" in options else TIMEOUT_S
+    with IdentifiedHead(default_rig(), timeout_s=timeout_s) as head:
         subscribe = head._subscribe_to_images
 
         def subscribe_and_soon_give_up() -> None:
             subscribe()
-            head._patience_s = PATIENCE_S if "stamp_age_s" in options else 2.0
+            head._timeout_s = TIMEOUT_S if "stamp_age_s" in options else 2.0
 
         head._subscribe_to_images = subscribe_and_soon_give_up  # type: ignore[method-assign]
         with pytest.raises(error, match=text):
@@ -219,9 +221,9 @@ def test_heads_that_cannot_be_used_are_refused(
 
 def test_eyes_that_close_in_the_middle_are_refused(start: Start) -> None:
     node = start(PaleHead)
-    with IdentifiedHead(default_rig(), patience_s=PATIENCE_S) as head:
+    with IdentifiedHead(default_rig(), timeout_s=TIMEOUT_S) as head:
         head.begin()
-        head._patience_s = 1.0
+        head._timeout_s = 1.0
         for timer in list(node.timers)[:1]:
             timer.cancel()
         with pytest.raises(IdentifyError, match="no images on left/image_raw and right/image_raw for 1 s"):

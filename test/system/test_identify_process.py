@@ -39,7 +39,7 @@ def start_head(processes: ProcessGroup, *remappings: str) -> None:
 
 def identify(out: Path, *options: str) -> "subprocess.Popen[str]":
     command = [sys.executable, "-m", "vergence_bringup.command_line", "identify", "--out", str(out), "--yes"]
-    command += ["--patience-s", "120"]
+    command += ["--timeout-s", "120"]
     return subprocess.Popen([*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

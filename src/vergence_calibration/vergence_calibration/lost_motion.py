@@ -1,8 +1,8 @@
-"""What a staircase of commands and the angles seen after each tell: gain, and the motion lost at every turn.
+"""Gain and lost motion of an axis, from a staircase of commands and the angles seen after each.
 
-A staircase up and down gives a loop: seen = gain * told + constant -+ half the lost motion, behind on the side it came
-from. Dead band and backlash both lose motion when the direction changes, and at rest nothing tells one from the other:
-what is seen is their sum.
+A staircase up and down gives a hysteresis loop: seen = gain * commanded + constant -+ half the lost motion, lagging in
+both directions. Dead band and backlash both lose motion when the direction changes; at rest only their sum can be
+measured.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ LEAST_SAMPLES = 8
 
 
 class LoopError(ValueError):
-    """A staircase that tells nothing."""
+    """A staircase from which no loop can be estimated."""
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Signed gain (seen per told), lost motion and residual in units of what was seen, and standard deviations."""
+    """Signed gain (seen per commanded), lost motion and residual in units of what was seen, and standard deviations."""
 
     gain: float
     gain_sigma: float
@@ -39,25 +39,27 @@ def staircase(amplitude_rad: float, steps: int, loops: int) -> list[float]:
     return [float(angle) for angle in [up[0], *(loop * loops), 0.0]]
 
 
-def fit_loop(told: Sequence[float] | Array, seen: Sequence[float] | Array) -> Loop:
-    """Return the loop of what was told, in order, and what was seen after each.
+def fit_loop(commanded: Sequence[float] | Array, seen: Sequence[float] | Array) -> Loop:
+    """Return the loop of commanded values, in order, and the values seen after each.
 
     Args:
-        told: at least 8, with moves in both directions.
+        commanded: at least 8, with moves in both directions.
         seen: as many; only their differences count.
 
     Raises:
-        LoopError: too few, none in one of the directions, or moves that are lost in the play.
+        LoopError: too few, none in one of the directions, or moves smaller than the lost motion.
     """
-    x, y = np.asarray(told, float), np.asarray(seen, float)
+    x, y = np.asarray(commanded, float), np.asarray(seen, float)
     if len(x) != len(y) or len(x) < LEAST_SAMPLES or not (np.isfinite(x).all() and np.isfinite(y).all()):
-        raise LoopError(f"{len(x)} commands and {len(y)} angles: allowed are {LEAST_SAMPLES} or more pairs")
+        raise LoopError(
+            f"there must be {LEAST_SAMPLES} or more pairs of command and angle: got {len(x)} commands, {len(y)} angles"
+        )
     direction = np.sign(np.diff(x, prepend=x[0]))
-    since_turn = _travel_since_turn(x)
+    since_reversal = _travel_since_reversal(x)
     gain, lost = 0.0, 0.0
     for _ in range(3):
-        # the first moves after a turn are spent on the lost motion: they say nothing of the gain
-        usable = (direction != 0) & (since_turn > 1.1 * lost / max(abs(gain), 1e-12))
+        # the first moves after a reversal only cross the lost motion: they carry no information on the gain
+        usable = (direction != 0) & (since_reversal > 1.1 * lost / max(abs(gain), 1e-12))
         if usable.sum() < LEAST_SAMPLES or len(set(direction[usable])) < 2:
             raise LoopError("the moves are too small for this servo's lost motion: make them larger")
         terms = np.column_stack([x - x.mean(), np.ones_like(x), direction])[usable]
@@ -76,14 +78,18 @@ def fit_loop(told: Sequence[float] | Array, seen: Sequence[float] | Array) -> Lo
     )
 
 
-def _travel_since_turn(told: Array) -> Array:
-    travel = np.zeros_like(told)
-    start = told[0]
-    for i in range(1, len(told)):
-        if i > 1 and (told[i] - told[i - 1]) * (told[i - 1] - told[i - 2]) < 0:
-            start = told[i - 1]
-        travel[i] = abs(told[i] - start)
-    # before the first turn nobody knows where the gears lie
-    turns = [i for i in range(2, len(told)) if (told[i] - told[i - 1]) * (told[i - 1] - told[i - 2]) < 0]
-    travel[: turns[0] if turns else len(told)] = 0.0
+def _travel_since_reversal(commanded: Array) -> Array:
+    travel = np.zeros_like(commanded)
+    start = commanded[0]
+    for i in range(1, len(commanded)):
+        if i > 1 and (commanded[i] - commanded[i - 1]) * (commanded[i - 1] - commanded[i - 2]) < 0:
+            start = commanded[i - 1]
+        travel[i] = abs(commanded[i] - start)
+    # before the first reversal the state of the backlash is unknown
+    reversals = [
+        i
+        for i in range(2, len(commanded))
+        if (commanded[i] - commanded[i - 1]) * (commanded[i - 1] - commanded[i - 2]) < 0
+    ]
+    travel[: reversals[0] if reversals else len(commanded)] = 0.0
     return travel

@@ -1,4 +1,4 @@
-"""What is recorded while one axis moves. Times are seconds of one clock, angles are joint angles [rad]."""
+"""The recording of one moving axis. Times are seconds of one clock, angles are joint angles [rad]."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,24 +18,26 @@ EYES = ("left", "right")
 
 
 class IdentifyError(ValueError):
-    """A head that cannot be identified, or should not be used as it is: says what was measured and what is allowed."""
+    """A head that cannot be identified or is connected wrongly: the message says what must hold and what was got."""
 
 
 @dataclass(frozen=True)
 class IdentifyParameters(Parameters):
     """How each axis is moved."""
 
-    amplitude_deg: float = parameter(3.0, "moves go this far either way", unit="degrees", minimum=1, maximum=15)
-    stairs: int = parameter(8, "steps of the staircase that tells gain and lost motion", minimum=6, maximum=40)
-    steps: int = parameter(14, "whole steps that tell the latencies", minimum=6, maximum=100)
+    amplitude_deg: float = parameter(
+        3.0, "amplitude of every move in either direction", unit="degrees", minimum=1, maximum=15
+    )
+    stairs: int = parameter(8, "steps of the staircase from which gain and lost motion follow", minimum=6, maximum=40)
+    steps: int = parameter(14, "number of steps from which the latencies follow", minimum=6, maximum=100)
     rest_s: float = parameter(0.45, "rest after every move, longer than any latency", unit="s", minimum=0.2, maximum=5)
 
 
 @dataclass(frozen=True)
 class Move:
-    """One command: where to, about the pose [rad], how long to rest there, and a share of a frame period beyond that.
+    """One command: angle from the pose [rad], rest after it, and a further share of a frame period.
 
-    The share spreads the commands over the camera's beat: a latency is known the better the more phases have been seen.
+    The share spreads the commands over the phases of the camera: the more phases, the more accurate the latency.
     """
 
     angle_rad: float
@@ -45,14 +47,14 @@ class Move:
 
 @dataclass
 class Frames:
-    """One eye's pictures in order: stamps and times of arrival [s], and the pictures, possibly smaller than taken."""
+    """One eye's pictures in order: stamps and times of arrival [s], and the pictures, possibly reduced in size."""
 
     stamps_s: list[float] = field(default_factory=list)
     arrivals_s: list[float] = field(default_factory=list)
     pictures: list[Image] = field(default_factory=list)
 
     def add(self, stamp_s: float, arrival_s: float, picture: Image) -> None:
-        """Append one; a stamp that does not rise is left out."""
+        """Append a frame; one whose stamp does not increase is left out."""
         if not self.stamps_s or stamp_s > self.stamps_s[-1]:
             self.stamps_s.append(stamp_s)
             self.arrivals_s.append(arrival_s)
@@ -71,20 +73,20 @@ class AxisLog:
 
 @dataclass(frozen=True)
 class EyeCamera:
-    """An eye's camera: its model, and whether that is a calibration of it or only what the rig says."""
+    """An eye's camera: its model, and whether it is calibrated or the rig's."""
 
     model: CameraModel
     calibrated: bool
 
 
 class Head(Protocol):
-    """A head whose joints can be told and whose eyes can be recorded."""
+    """A head whose joints can be commanded and whose images can be recorded."""
 
     def cameras(self) -> Mapping[str, EyeCamera]:
         """Return the cameras by eye. Raises IdentifyError."""
 
     def record(self, joint: str, moves: Sequence[Move]) -> AxisLog:
-        """Make the moves of one joint about the pose and return what came meanwhile. Raises IdentifyError."""
+        """Make the moves of one joint about the pose and return the recording. Raises IdentifyError."""
 
 
 def stair_moves(angles_rad: Sequence[float], rest_s: float) -> list[Move]:
@@ -93,7 +95,7 @@ def stair_moves(angles_rad: Sequence[float], rest_s: float) -> list[Move]:
 
 
 def step_moves(amplitude_rad: float, steps: int, rest_s: float) -> list[Move]:
-    """Return moves from one side to the other and back, whose phases fill the camera's period evenly."""
+    """Return moves from one side to the other and back, whose phases cover the camera's period evenly."""
     golden = 0.5 * (math.sqrt(5.0) - 1.0)
     return [Move(amplitude_rad if k % 2 else -amplitude_rad, rest_s, (k * golden) % 1.0) for k in range(steps + 1)] + [
         Move(0.0, rest_s, 0.0)

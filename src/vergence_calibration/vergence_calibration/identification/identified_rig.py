@@ -1,4 +1,4 @@
-"""What was identified, as the rig that every node reads and as a record beside it."""
+"""The results as a rig that every node reads, and as a record of all values."""
 
 import dataclasses
 import math
@@ -9,11 +9,11 @@ import yaml
 from vergence_calibration.identification.axis_log import EYES, IdentifyError
 from vergence_calibration.identification.identification import Identification
 from vergence_calibration.identification.latencies import Estimate
-from vergence_calibration.identification.wiring import cross_talk
+from vergence_calibration.identification.wiring_faults import cross_talk
 from vergence_rig.parameters import ParameterError
 from vergence_rig.rig import CameraSpec, Joints, JointSpec, Rig, rig_as_mapping, rig_from_mapping
 
-_HEAD = "# Written by vergence identify; the file before it lies beside it. Keys: config/rig.yaml, docs/identify.md\n"
+_HEAD = "# Written by vergence identify; the old file is kept beside it. Keys: config/rig.yaml, docs/identify.md\n"
 _NODES_HEAD = "# Written by vergence identify, for --params-file after the shipped ones: docs/identify.md\n"
 _SIGNIFICANT = 3.0
 _LEAST_LOST_RAD = math.radians(0.1)
@@ -22,15 +22,15 @@ _LEAST_LOST_RAD = math.radians(0.1)
 def identified_rig(rig: Rig, found: Identification) -> Rig:
     """Return the rig with the measured latency, speed and lost motion of the identified axes.
 
-    A speed that was too fast to tell, and a lost motion within its uncertainty (or 0.1 degree) of the rig's, stay. Dead
+    A speed too fast to measure, and a lost motion within its uncertainty (or 0.1 degree) of the rig's, stay. Dead
     band and backlash share the lost motion as they did. A camera that has no calibration gets its focal lengths from
-    the pixels per radian, as far as its axes were moved. Raises IdentifyError where a figure cannot be.
+    the pixels per radian, as far as its axes were moved. Raises IdentifyError for an impossible value.
     """
     try:
         joints = [_joint(name, joint, found) if name in found.timings else joint for name, joint in rig.joints.items()]
         cameras = {eye: _camera(eye, spec, found) for eye, spec in zip(EYES, (rig.left_camera, rig.right_camera))}  # noqa: B905
     except ParameterError as error:
-        raise IdentifyError(f"what was measured is no servo: {error}") from error
+        raise IdentifyError(f"the measured servo is not possible: {error}") from error
     return dataclasses.replace(rig, left_camera=cameras["left"], right_camera=cameras["right"], joints=Joints(*joints))
 
 
@@ -65,7 +65,7 @@ def _camera(eye: str, spec: CameraSpec, found: Identification) -> CameraSpec:
 def rig_text(rig: Rig, found: Identification, when: str) -> str:
     """Return rig.yaml for an identified rig, with the record of what was found. `when` is the time in words."""
     document = rig_as_mapping(rig) | {"identified": {"at": when, **record(found)}}
-    assert rig_from_mapping(document) == rig  # what is written is what was meant
+    assert rig_from_mapping(document) == rig  # the file reads back as the same rig
     return _HEAD + yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
 
 
@@ -75,7 +75,7 @@ def nodes_text(document: dict[str, Any]) -> str:
 
 
 def record(found: Identification) -> dict[str, Any]:
-    """Return every figure with its standard deviation, as plain values; what is not known is null."""
+    """Return every value with its standard deviation, as plain values; null where it was not measured."""
     latencies = found.latencies
     axes: dict[str, Any] = {}
     for joint, response in found.responses.items():

@@ -1,16 +1,16 @@
-"""From the lags that can be seen to the latencies of servos and cameras.
+"""From measured lags to the latencies of servos and cameras.
 
-Seen is, for every axis and eye, the time from a command to the motion in the pictures, by the pictures' own stamps:
+Measured is, for every axis and eye, the time from a command to the motion in the images, by the images' stamps:
 
     lag(joint, eye) = servo latency(joint) + lateness of the eye's stamps
 
-where a stamp's lateness is by how much it lies after the middle of the exposure. The lags alone cannot be split: add
-10 ms to every servo and take them from both cameras, and nothing that can be seen changes. What can be: the sum (the
-loop that control has to live with), the arrival after the stamp, and the difference of the two cameras' lateness,
-since the tilt moves both. The split needs an assumption, one of
+where a stamp's lateness is its time after the middle of the exposure. The lags alone do not determine both terms: 10 ms
+more for every servo and 10 ms less for both cameras give the same measurements. Determined are the sum (the loop's
+delay), the arrival after the stamp, and the difference of the two cameras' lateness, since the tilt moves both. The
+split needs an assumption, one of
 
-    stamps  the pictures' stamps are right (of two that differ, the earlier: stamps are late, never early)
-    joints  joint_states are right: they come from encoders, or from a driver whose latency has been measured
+    stamps  the images' stamps are correct (of two that differ, the earlier: stamps are late, never early)
+    joints  joint_states are correct: they come from encoders, or from a driver whose latency has been measured
 """
 
 import math
@@ -47,14 +47,14 @@ class Arrival:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A time and its standard deviation [s]; NaN where it is not known."""
+    """A time and its standard deviation [s]; NaN where it was not measured."""
 
     value_s: float
     sigma_s: float
 
     @property
     def known(self) -> bool:
-        """True if there is one."""
+        """True if it was measured."""
         return math.isfinite(self.value_s)
 
 
@@ -63,7 +63,7 @@ UNKNOWN = Estimate(math.nan, math.nan)
 
 @dataclass(frozen=True)
 class Latencies:
-    """What follows under an assumption.
+    """The latencies under an assumption.
 
     servo_s: command to first motion, by joint. stamp_late_s: by how much each eye's stamps lie after the exposure.
     exposure_to_arrival_s: by eye. joints_late_s: by how much joint_states are behind the true motion, by joint
@@ -83,7 +83,7 @@ class Latencies:
 def split(timings: Mapping[str, AxisTiming], arrivals: Mapping[str, Arrival], assumption: str) -> Latencies:
     """Return the latencies under an assumption (see the module). Raises IdentifyError where it cannot be applied."""
     if assumption not in ASSUMPTIONS:
-        raise IdentifyError(f"assumption is {assumption!r}: allowed is one of {', '.join(ASSUMPTIONS)}")
+        raise IdentifyError(f"assumption must be one of {', '.join(ASSUMPTIONS)}: got {assumption!r}")
     apart = _eyes_apart(timings)
     late = _lateness_by_joints(timings) if assumption == "joints" else _lateness_by_stamps(apart)
     servo, joints_late = {}, {}
@@ -107,8 +107,8 @@ def split(timings: Mapping[str, AxisTiming], arrivals: Mapping[str, Arrival], as
     for joint, latency in servo.items():
         if latency.value_s < -3 * latency.sigma_s - 0.005 or latency.value_s > _MOST_S:
             raise IdentifyError(
-                f"{joint} would move {1e3 * latency.value_s:+.0f} ms after its command if '{assumption}' were right: "
-                f"allowed is 0 to {1e3 * _MOST_S:.0f} ms; take the other assumption, or set the clocks"
+                f"{joint} must move 0 to {1e3 * _MOST_S:.0f} ms after its command: got {1e3 * latency.value_s:+.0f} ms "
+                f"under the assumption '{assumption}'; use the other assumption, or set the clocks"
             )
     return Latencies(
         assumption=assumption,
@@ -149,7 +149,7 @@ def _lateness_by_joints(timings: Mapping[str, AxisTiming]) -> dict[str, Estimate
             if eye in t.seen and t.reported is not None
         ]
         if not seen and any(eye in t.seen for t in timings.values()):
-            raise IdentifyError("joint_states do not show the moves: allowed is the assumption 'stamps' only")
+            raise IdentifyError("joint_states do not show the moves: the assumption must be 'stamps'")
         late[eye] = _mean(seen)
     return late
 
@@ -168,7 +168,7 @@ def _minus(one: Estimate, other: Estimate) -> Estimate:
 
 
 def _mean(estimates: list[Estimate]) -> Estimate:
-    """Return the weighted mean; its deviation is no less than the estimates' disagreement asks for."""
+    """Return the weighted mean; its deviation covers the estimates' disagreement."""
     if not estimates:
         return UNKNOWN
     weights = [1.0 / max(e.sigma_s, 1e-4) ** 2 for e in estimates]

@@ -1,4 +1,4 @@
-"""Latencies that nodes hold as parameters of their own: a camera's stamp offset, a servo driver's modelled latency."""
+"""Latencies that are parameters of nodes: a camera's stamp offset, a servo driver's modelled latency."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _LONGEST_S = 1.0
 
 @dataclass(frozen=True)
 class Owner:
-    """A node that has such a parameter, and its value now [s]."""
+    """A node with such a parameter, and the parameter's value [s]."""
 
     name: str
     value_s: float
@@ -22,17 +22,17 @@ class Owner:
 
 @dataclass(frozen=True)
 class Owners:
-    """The cameras' nodes by eye, and the one that drives the servos; those that have no such parameter are left out."""
+    """The cameras' nodes by eye, and the one that drives the servos; nodes without the parameter are left out."""
 
     cameras: Mapping[str, Owner]
     servos: Owner | None
 
 
 def node_parameters(latencies: Latencies, owners: Owners) -> dict[str, Any]:
-    """Return a ROS parameter document by node with what should be changed; empty where nothing should.
+    """Return a ROS parameter document by node with the changes; empty for none.
 
-    The image stamps are moved back by what they lie after the exposure, and the driver's model is slowed or hastened by
-    the mean of what its joint_states are ahead or behind.
+    The image stamps are moved back by their lateness, and the driver's modelled latency is corrected by the mean
+    lateness of its joint_states.
     """
     document: dict[str, Any] = {}
     for eye in EYES:

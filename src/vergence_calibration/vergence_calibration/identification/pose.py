@@ -1,4 +1,4 @@
-"""Where the head stands while its axes are moved: near where it was, with room on both sides."""
+"""The pose about which the axes are moved: near the present one, with room on both sides."""
 
 from collections.abc import Mapping
 
@@ -9,14 +9,14 @@ _MARGIN_RAD = 0.002
 
 
 def pose_with_room(rig: Rig, present_rad: Mapping[str, float], amplitude_rad: float) -> dict[str, float]:
-    """Return joint angles [rad] from which every joint may move by the amplitude either way.
+    """Return joint angles [rad] from which every joint can move by the amplitude in either direction.
 
     That keeps to the joints' limits and to the rig's least vergence, while one pan moves and the other rests.
 
     Args:
         rig: its limits.
-        present_rad: where the joints are, all of them.
-        amplitude_rad: how far they will move.
+        present_rad: the present angles of all joints.
+        amplitude_rad: of the moves.
 
     Raises:
         IdentifyError: limits too close together for such moves.
@@ -27,8 +27,8 @@ def pose_with_room(rig: Rig, present_rad: Mapping[str, float], amplitude_rad: fl
         low, high = joint.lower_rad + reach_rad, joint.upper_rad - reach_rad
         if low > high:
             raise IdentifyError(
-                f"{name} may move from {joint.lower_rad:.3f} to {joint.upper_rad:.3f} rad: allowed is a range of "
-                f"{2 * reach_rad:.3f} rad or more for these moves (--amplitude-deg)"
+                f"{name} must have a range of {2 * reach_rad:.3f} rad or more for these moves (--amplitude-deg): got "
+                f"{joint.lower_rad:.3f} to {joint.upper_rad:.3f} rad"
             )
         bounds[name] = low, high
     pose = {name: min(max(present_rad[name], bounds[name][0]), bounds[name][1]) for name in JOINT_NAMES}
@@ -41,8 +41,8 @@ def pose_with_room(rig: Rig, present_rad: Mapping[str, float], amplitude_rad: fl
         right = min(max(right, left + rig.minimum_vergence_rad + reach_rad), bounds["pan_right"][1])
         if right - left < rig.minimum_vergence_rad + amplitude_rad:
             raise IdentifyError(
-                f"minimum_vergence_rad is {rig.minimum_vergence_rad:g}: the pans' limits leave no room for moves of "
-                f"{amplitude_rad:.3f} rad (--amplitude-deg)"
+                f"the pans' limits must leave room for moves of {amplitude_rad:.3f} rad (--amplitude-deg) beyond "
+                f"minimum_vergence_rad, {rig.minimum_vergence_rad:g}"
             )
         pose |= {"pan_left": left, "pan_right": right}
     return pose

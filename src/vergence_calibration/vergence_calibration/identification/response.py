@@ -1,4 +1,4 @@
-"""What each eye sees when one axis is told to move: gains, play, and what else turns along with it."""
+"""The response of both eyes to the moves of one axis: gains, lost motion and cross-talk."""
 
 import math
 from collections.abc import Mapping
@@ -14,19 +14,19 @@ from vergence_calibration.lost_motion import Loop, LoopError, fit_loop
 Array = npt.NDArray[np.float64]
 
 SEEN_BY = {"pan_left": ("left",), "pan_right": ("right",), "tilt": EYES}
-"""The eyes that an axis turns, when all is connected as it should be."""
+"""The eyes that an axis turns if the wiring is right."""
 
 _LEAST_AGREEMENT = 0.6
 _MOST_RESIDUAL = 0.2
-# With a calibrated camera only the servo can be wrong; without, its focal length is only a guess.
+# Without a calibrated camera the focal length is uncertain too.
 _GAINS = {True: (0.75, 1.25), False: (0.4, 2.5)}
 
 
 @dataclass(frozen=True)
 class Response:
-    """Slopes of what was seen over what was told, (2, 2): eyes left and right, pan and tilt.
+    """Slopes of seen over commanded angle, (2, 2): eyes left and right, pan and tilt.
 
-    `unrelated_rad` (2, 2) is what else moved, root mean square: the play of the servo, and whatever moves by itself.
+    `unrelated_rad` (2, 2) is the RMS residual: the servo's backlash, and things that move by themselves.
     """
 
     joint: str
@@ -37,10 +37,10 @@ class Response:
 
 @dataclass(frozen=True)
 class EyeGain:
-    """How far an axis turns one eye: seen per told, and in pixels at the image's centre per radian told.
+    """Gain of an axis in one eye: seen per commanded angle, and in pixels at the image's centre per radian commanded.
 
-    `fx_px` is the focal length that camera_info (or the rig) says, along the axis's own direction: what a joint that
-    turns exactly as far as it is told would show.
+    `fx_px` is the focal length of camera_info (or the rig) along the axis's direction: the pixels per radian of a joint
+    that turns exactly as commanded.
     """
 
     joint: str
@@ -50,17 +50,17 @@ class EyeGain:
 
     @property
     def px_per_rad(self) -> float:
-        """Pixels per radian told."""
+        """Pixels per radian commanded."""
         return abs(self.loop.gain) * self.fx_px
 
     @property
     def px_per_rad_sigma(self) -> float:
-        """Its standard deviation."""
+        """Standard deviation of `px_per_rad`."""
         return self.loop.gain_sigma * self.fx_px
 
     @property
     def deviation(self) -> float:
-        """By what share that is more than the focal length."""
+        """Relative difference of `px_per_rad` from the focal length."""
         return abs(self.loop.gain) - 1.0
 
 
@@ -73,38 +73,38 @@ def motions(log: AxisLog, cameras: Mapping[str, EyeCamera]) -> dict[str, SeenMot
         agreement = float(np.nanmedian(seen[eye].agreement))
         if agreement < _LEAST_AGREEMENT:
             raise IdentifyError(
-                f"{where}: only {agreement:.0%} of what it sees moves together: allowed is {_LEAST_AGREEMENT:.0%} or "
-                "more; something moves in view"
+                f"{where}: {_LEAST_AGREEMENT:.0%} or more of the features must move together: got {agreement:.0%}; "
+                "something moves in view"
             )
     return seen
 
 
 def response(log: AxisLog, seen: Mapping[str, SeenMotion]) -> Response:
     """Return the slopes of a staircase. Raises IdentifyError where too few rests were seen."""
-    stamps_s, told_rad = log.commands[:, 0], log.commands[:, 1]
+    stamps_s, commanded_rad = log.commands[:, 0], log.commands[:, 1]
     slopes, unrelated = np.zeros((2, 2)), np.zeros((2, 2))
     for row, eye in enumerate(EYES):
         for column, values in enumerate((seen[eye].pan_rad, seen[eye].tilt_rad)):
             rests = settled(seen[eye].stamps_s, values, stamps_s)
-            slopes[row, column], unrelated[row, column] = _slope(told_rad, rests, f"{log.joint}, {eye} eye")
-    return Response(log.joint, 0.5 * float(np.ptp(told_rad)), slopes, unrelated)
+            slopes[row, column], unrelated[row, column] = _slope(commanded_rad, rests, f"{log.joint}, {eye} eye")
+    return Response(log.joint, 0.5 * float(np.ptp(commanded_rad)), slopes, unrelated)
 
 
-def _slope(told_rad: Array, seen_rad: Array, where: str) -> tuple[float, float]:
+def _slope(commanded_rad: Array, seen_rad: Array, where: str) -> tuple[float, float]:
     known = np.isfinite(seen_rad)
-    if known.sum() < max(8, 0.6 * len(told_rad)):
+    if known.sum() < max(8, 0.6 * len(commanded_rad)):
         raise IdentifyError(
-            f"{where}: it was seen at rest after {int(known.sum())} of {len(told_rad)} moves: allowed is 60 % or more"
+            f"{where}: it must be seen at rest after 60 % or more of {len(commanded_rad)} moves: got {int(known.sum())}"
         )
-    told, seen = told_rad[known] - told_rad[known].mean(), seen_rad[known] - seen_rad[known].mean()
-    slope = float(told @ seen / (told @ told))
-    return slope, float(np.sqrt(np.mean((seen - slope * told) ** 2)))
+    commanded, seen = commanded_rad[known] - commanded_rad[known].mean(), seen_rad[known] - seen_rad[known].mean()
+    slope = float(commanded @ seen / (commanded @ commanded))
+    return slope, float(np.sqrt(np.mean((seen - slope * commanded) ** 2)))
 
 
 def eye_gain(log: AxisLog, eye: str, seen: SeenMotion, camera: EyeCamera) -> EyeGain:
     """Return how far a staircase of this axis turns one eye.
 
-    Raises IdentifyError where what is seen does not follow, or is too far from what was told.
+    Raises IdentifyError where the eye does not follow the commands, or its gain is implausible.
     """
     where = f"{log.joint}, {eye} eye"
     values = seen.tilt_rad if log.joint == "tilt" else seen.pan_rad
@@ -117,15 +117,15 @@ def eye_gain(log: AxisLog, eye: str, seen: SeenMotion, camera: EyeCamera) -> Eye
     spread_rad = float(np.ptp(log.commands[:, 1]))
     if loop.residual > _MOST_RESIDUAL * spread_rad:
         raise IdentifyError(
-            f"{where}: what is seen is {math.degrees(loop.residual):.2f} degrees off what was told: allowed is "
-            f"{math.degrees(_MOST_RESIDUAL * spread_rad):.2f}; does something move in view?"
+            f"{where}: seen and commanded angles must agree to {math.degrees(_MOST_RESIDUAL * spread_rad):.2f} "
+            f"degrees: got {math.degrees(loop.residual):.2f}; does something move in view?"
         )
     gain = EyeGain(log.joint, eye, loop, camera.model.fy_px if log.joint == "tilt" else camera.model.fx_px)
     low, high = _GAINS[camera.calibrated]
     if not low <= abs(loop.gain) <= high:
         raise IdentifyError(
-            f"{where}: {gain.px_per_rad:.0f} px per radian told: allowed is {low * gain.fx_px:.0f} to "
-            f"{high * gain.fx_px:.0f}, near the focal length of {gain.fx_px:.0f} px; run "
-            f"`calibrate_servos --visual` for {log.joint}, or `vergence calibrate cameras`"
+            f"{where}: px per radian commanded must be {low * gain.fx_px:.0f} to {high * gain.fx_px:.0f}, near the "
+            f"focal length of {gain.fx_px:.0f} px: got {gain.px_per_rad:.0f}; run `calibrate_servos --visual` for "
+            f"{log.joint}, or `vergence calibrate cameras`"
         )
     return gain

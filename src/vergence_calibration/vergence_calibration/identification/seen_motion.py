@@ -1,4 +1,4 @@
-"""How an eye turned in the course of a recording."""
+"""The rotation of an eye over a recording."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vergence_calibration.eye_turn import Image, NoMotionSeenError, Sight
+from vergence_calibration.eye_turn import Image, NoMotionSeenError, ReferenceImage
 from vergence_calibration.identification.axis_log import Frames, IdentifyError
 from vergence_rig.camera import CameraModel
 
@@ -20,9 +20,9 @@ _LEAST_FRAMES = 8
 
 @dataclass(frozen=True)
 class SeenMotion:
-    """One eye's turn since the first frame, (n,) each: stamps and arrivals [s], pan and tilt [rad], agreement.
+    """One eye's rotation since the first frame, (n,) each: stamps and arrivals [s], pan and tilt [rad], agreement.
 
-    Frames in which nothing was found again are NaN.
+    NaN for frames in which too few features were found again.
     """
 
     stamps_s: Array
@@ -33,7 +33,7 @@ class SeenMotion:
 
 
 def shrunk(picture: Image) -> Image:
-    """Return a grey picture (h, w) of 320 px width or less: small enough to keep hundreds of them."""
+    """Return a grey picture (h, w) of 320 px width or less: small enough to store hundreds of them."""
     grey = picture if picture.ndim == 2 else np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
     if grey.shape[1] <= _WIDTH_PX:
         return np.ascontiguousarray(grey)
@@ -42,13 +42,13 @@ def shrunk(picture: Image) -> Image:
 
 
 def shrunk_camera(camera: CameraModel, picture: Image) -> CameraModel:
-    """Return the camera of a picture that was made smaller. Raises IdentifyError where the shapes differ."""
+    """Return the camera of a picture that was reduced in size. Raises IdentifyError where the shapes differ."""
     height, width = picture.shape[:2]
     x, y = width / camera.width_px, height / camera.height_px
     if abs(x / y - 1.0) > 0.02:
         raise IdentifyError(
-            f"camera_info is of {camera.width_px}x{camera.height_px} px, the pictures are shaped {width}:{height}: "
-            "allowed is one shape; calibrate the camera in the mode it runs in"
+            f"no calibration for images of aspect ratio {width}:{height}: camera_info is for {camera.width_px}x"
+            f"{camera.height_px} px; calibrate the camera in its running mode"
         )
     middle_x, middle_y = (camera.cx_px + 0.5) * x - 0.5, (camera.cy_px + 0.5) * y - 0.5
     k = [camera.fx_px * x, 0.0, middle_x, 0.0, camera.fy_px * y, middle_y, 0.0, 0.0, 1.0]
@@ -62,24 +62,24 @@ def seen_motion(frames: Frames, camera: CameraModel, where: str) -> SeenMotion:
 
     Args:
         frames: the recording.
-        camera: of the pictures as they were taken.
-        where: the words for the error, as "pan_left, left eye".
+        camera: of the pictures in their original size.
+        where: the subject of the error, such as "pan_left, left eye".
 
     Raises:
-        IdentifyError: too few frames, or too little to be found again in them.
+        IdentifyError: too few frames, or too few features found again in them.
     """
     count = len(frames.stamps_s)
     if count < _LEAST_FRAMES:
-        raise IdentifyError(f"{where}: {count} images came during the moves: allowed are {_LEAST_FRAMES} or more")
+        raise IdentifyError(f"{where}: {_LEAST_FRAMES} or more images must come during the moves: got {count}")
     turns = np.full((count, 3), np.nan)
     try:
-        sight = Sight(frames.pictures[0], shrunk_camera(camera, frames.pictures[0]))
+        reference = ReferenceImage(frames.pictures[0], shrunk_camera(camera, frames.pictures[0]))
     except NoMotionSeenError as error:
-        raise IdentifyError(f"{where}: {error}; let it look at something with texture") from None
+        raise IdentifyError(f"{where}: {error}; point the eye at something with texture") from None
     problem = ""
     for i, picture in enumerate(frames.pictures):
         try:
-            turn = sight.turn(picture)
+            turn = reference.turn(picture)
         except NoMotionSeenError as error:
             problem = str(error)
             continue
@@ -87,7 +87,7 @@ def seen_motion(frames: Frames, camera: CameraModel, where: str) -> SeenMotion:
     usable = float(np.isfinite(turns[:, 0]).mean())
     if usable < _LEAST_USABLE:
         raise IdentifyError(
-            f"{where}: motion was seen in {usable:.0%} of {count} images: allowed is {_LEAST_USABLE:.0%} or more "
+            f"{where}: motion must be seen in {_LEAST_USABLE:.0%} or more of the images: got {usable:.0%} of {count} "
             f"({problem}; is the light steady, does something hide the view?)"
         )
     return SeenMotion(np.array(frames.stamps_s), np.array(frames.arrivals_s), turns[:, 0], turns[:, 1], turns[:, 2])

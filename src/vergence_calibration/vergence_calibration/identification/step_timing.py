@@ -1,8 +1,9 @@
-"""When a step shows: latency and speed from steps that a camera, or a driver, samples far too seldom.
+"""Latency and speed of steps that a camera, or a driver, samples coarsely.
 
-A step of a hobby servo is over within a frame or two, so that one step only says between which frames it was. Many,
-at many phases of the frames, say it to a millisecond: the posterior of onset, speed and jitter on a grid, every step
-with a latency of its own about a common one (a servo reads its pulse only every 20 ms). Outliers are allowed for.
+A step of a hobby servo ends within a frame or two, so one step gives its time only to a frame interval. Many steps, at
+many phases of the frames, give it to a millisecond: the posterior of onset, speed and jitter is computed on a grid,
+where every step has its own latency about a common one (a servo reads its pulse only every 20 ms). The model includes
+outliers.
 """
 
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ class StepTiming:
     """Latency from the command to the first motion (onset) and to half of it (middle), with standard deviations.
 
     `jitter_s` is how much the latency varies from step to step; the speed is the motion's, `speed_known` if the frames
-    were close enough to tell it.
+    were dense enough to measure it.
     """
 
     onset_s: float
@@ -62,24 +63,24 @@ def steps_in(commands: Array, stamps_s: Array, values_rad: Array, latest_s: floa
 
     Args:
         commands: (n, 2) stamps [s] and angles [rad], in order; steps shorter than half the longest are left out.
-        stamps_s: (m,) of the signal, rising.
-        values_rad: (m,) the signal [rad]; NaN where it is not known.
+        stamps_s: (m,) of the signal, increasing.
+        values_rad: (m,) the signal [rad]; NaN where it is missing.
         latest_s: samples until so long after a command are its step's [s].
     """
     known = np.isfinite(values_rad)
     stamps_s, values_rad = stamps_s[known], values_rad[known]
-    told = np.diff(commands[:, 1])
-    longest_rad = float(np.abs(told).max(initial=0.0))
+    commanded = np.diff(commands[:, 1])
+    longest_rad = float(np.abs(commanded).max(initial=0.0))
     steps = []
-    for k in range(len(told)):
+    for k in range(len(commanded)):
         begin_s = commands[k + 1, 0]
         end_s = commands[k + 2, 0] if k + 2 < len(commands) else stamps_s[-1] + _STEP_S if len(stamps_s) else begin_s
         before = values_rad[(stamps_s > commands[k, 0]) & (stamps_s < begin_s)][-3:]
         after = values_rad[(stamps_s > begin_s) & (stamps_s < end_s)][-3:]
-        if abs(told[k]) < 0.5 * longest_rad or len(before) < 2 or len(after) < 2:
+        if abs(commanded[k]) < 0.5 * longest_rad or len(before) < 2 or len(after) < 2:
             continue
         low, high = float(np.median(before)), float(np.median(after))
-        if abs(high - low) < 0.3 * abs(told[k]):
+        if abs(high - low) < 0.3 * abs(commanded[k]):
             continue
         inside = (stamps_s > begin_s + _EARLIEST_S) & (stamps_s < min(end_s, begin_s + latest_s))
         scatter = max(float(np.ptp(before)), float(np.ptp(after))) / abs(high - low)
@@ -93,28 +94,28 @@ def step_timing(steps: Sequence[Step], latest_s: float, what: str) -> StepTiming
 
     Args:
         steps: at least four; better a dozen, at different phases of the samples.
-        latest_s: the longest latency that is looked for [s].
-        what: the words for the error, as "pan_left, left eye".
+        latest_s: the longest latency considered [s].
+        what: the subject of the error, such as "pan_left, left eye".
 
     Raises:
-        IdentifyError: too few steps, or a latency beyond what can be told.
+        IdentifyError: too few steps, or a latency outside the considered range.
     """
     if len(steps) < _LEAST_STEPS:
         raise IdentifyError(
-            f"{what}: {len(steps)} whole steps were seen: allowed are {_LEAST_STEPS} or more (do images come?)"
+            f"{what}: {_LEAST_STEPS} or more whole steps must be seen: got {len(steps)} (do images come?)"
         )
     onsets_s = np.arange(_EARLIEST_S, latest_s + 0.5 * _STEP_S, _STEP_S)
     single = np.stack([_likelihood(step, onsets_s) for step in steps])  # (steps, speeds, onsets)
     logs = np.stack([_joint(single, jitter_s) for jitter_s in _JITTERS_S])  # (jitters, speeds, onsets)
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()
-    # close to the ends of the range the posterior is cut off: that is no answer
+    # close to the ends of the range the posterior is cut off: no valid estimate
     by_onset = weights.sum(axis=(0, 1))
     edge = max(int(0.01 / _STEP_S), 1)
     if by_onset[-edge:].sum() > 0.1 or by_onset[:edge].sum() > 0.1:
         raise IdentifyError(
-            f"{what}: the motion comes {1e3 * float(by_onset @ onsets_s):+.0f} ms after its command: allowed is "
-            f"{1e3 * _EARLIEST_S:.0f} to {1e3 * latest_s:.0f} ms (do the machines' clocks agree?)"
+            f"{what}: the motion must come {1e3 * _EARLIEST_S:.0f} to {1e3 * latest_s:.0f} ms after its command: got "
+            f"{1e3 * float(by_onset @ onsets_s):+.0f} ms (do the machines' clocks agree?)"
         )
     length_rad = float(np.median([step.length_rad for step in steps]))
     middles_s = onsets_s[None, :] + 0.5 * length_rad / _SPEEDS_RAD_S[:, None]
@@ -137,7 +138,7 @@ def step_timing(steps: Sequence[Step], latest_s: float, what: str) -> StepTiming
 
 
 def _likelihood(step: Step, onsets_s: Array) -> Array:
-    """Return how likely each speed and onset is, (speeds, onsets), scaled to a greatest of 1."""
+    """Return the likelihood of each speed and onset, (speeds, onsets), scaled to a maximum of 1."""
     durations_s = step.length_rad / _SPEEDS_RAD_S
     total = np.zeros((len(_SPEEDS_RAD_S), len(onsets_s)))
     for since_s, done in zip(step.since_s, step.done, strict=True):

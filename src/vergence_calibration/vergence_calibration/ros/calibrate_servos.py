@@ -1,4 +1,4 @@
-"""calibrate_servos: finds each servo's pulses, angles and limits, by hand or by what the cameras see.
+"""calibrate_servos: measures each servo's pulses, angles and limits, by hand or from the cameras' images.
 
 By hand, with servo_node not running:
     calibrate_servos --servos servos.yaml --backend kernel_pwm
@@ -15,7 +15,7 @@ from typing import Any
 
 import yaml
 
-from vergence_calibration import kept_file
+from vergence_calibration import backed_up_file
 from vergence_calibration.servos import servo_file
 from vergence_calibration.servos.jog_session import JogSession
 from vergence_calibration.servos.terminal import NoTerminalError, Terminal
@@ -24,26 +24,38 @@ from vergence_servo.calibration import ServoCalibration, ServoCalibrationError, 
 from vergence_servo.drivers.protocol import DriverIoError, ServoDriver
 from vergence_servo.drivers.registry import open_driver
 
-_HELP = "arrows: 10 and 1 us, page keys: 50 us, [ 0 ] a: record, r: release, Enter: done, Esc: leave as it was"
+_HELP = "arrows: 10 and 1 us, page keys: 50 us, [ 0 ] a: record, r: release, Enter: done, Esc: discard"
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run; 0 written or nothing to write, 1 left as it was, 2 bad input."""
+    """Run; returns 0 if written or unchanged, 1 if discarded, 2 for bad input."""
     parser = argparse.ArgumentParser(
         prog="calibrate_servos", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--servos", required=True, type=Path, help="servos.yaml to improve; made if it is not there")
-    parser.add_argument("--joint", action="append", help="only this joint (repeatable); left out: all in the file")
-    parser.add_argument("--backend", default="kernel_pwm", help="what makes the pulses (default %(default)s)")
+    parser.add_argument("--servos", required=True, type=Path, help="servos.yaml to update; created if missing")
     parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="a parameter of the backend, as address=65"
+        "--joint", action="append", help="calibrate only this joint (repeatable; default: all in the file)"
+    )
+    parser.add_argument("--backend", default="kernel_pwm", help="servo driver (default %(default)s)")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="a parameter of the servo driver, such as address=65",
     )
     parser.add_argument("--yes", action="store_true", help="write without asking")
-    parser.add_argument("--visual", action="store_true", help="by what the cameras see; the head must be running")
+    parser.add_argument(
+        "--visual", action="store_true", help="calibrate from the cameras' images; the head must be running"
+    )
     parser.add_argument("--rig", default="", help="rig.yaml, for --visual")
     parser.add_argument("--namespace", default="", help="the head's namespace, for --visual")
-    parser.add_argument("--amplitude-deg", type=float, default=5.0, help="how far --visual moves (default %(default)s)")
-    parser.add_argument("--far-m", type=float, default=0.0, help="distance of the scene, to find the pans' trims")
+    parser.add_argument(
+        "--amplitude-deg", type=float, default=5.0, help="amplitude of the moves of --visual (default %(default)s)"
+    )
+    parser.add_argument(
+        "--far-m", type=float, default=0.0, help="distance of the scene, from which --visual finds the pans' trims"
+    )
     options = parser.parse_args(args)
     try:
         old = load_servos(options.servos) if options.servos.exists() else default_servos()
@@ -51,7 +63,7 @@ def main(args: Sequence[str] | None = None) -> int:
         fresh = _visually(options, old, joints) if options.visual else _by_hand(options, old, joints)
         return _write(options, old | fresh)
     except (KeyboardInterrupt, EOFError):
-        print("\nleft as it was", file=sys.stderr)
+        print("\nnothing was written", file=sys.stderr)
         return 1
     except (ValueError, OSError) as error:
         print(f"calibrate_servos: {error}", file=sys.stderr)
@@ -61,7 +73,7 @@ def main(args: Sequence[str] | None = None) -> int:
 def _chosen(asked: list[str] | None, servos: Mapping[str, ServoCalibration]) -> list[str]:
     for name in asked or []:
         if name not in servos:
-            raise ServoCalibrationError(f"joint is {name!r}: allowed is one of {', '.join(servos)}")
+            raise ServoCalibrationError(f"joint must be one of {', '.join(servos)}: got {name!r}")
     return list(asked or servos)
 
 
@@ -74,8 +86,8 @@ def _by_hand(
     try:
         with terminal.keys():
             for name in joints:
-                terminal.say(f"\n{name}, channel {old[name].channel}, {old[name].model}: {_summary(old[name])}")
-                terminal.say("Enter keeps it, c calibrates it")
+                terminal.print_line(f"\n{name}, channel {old[name].channel}, {old[name].model}: {_summary(old[name])}")
+                terminal.print_line("Enter keeps it, c calibrates it")
                 while (key := terminal.key()) not in ("enter", "c"):
                     continue
                 found = _jog(terminal, driver, old[name]) if key == "c" else None
@@ -93,7 +105,7 @@ def _jog(terminal: Terminal, driver: ServoDriver, servo: ServoCalibration) -> Se
         "]": session.mark_maximum,
         "0": session.mark_centre,
     }
-    terminal.say(_HELP)
+    terminal.print_line(_HELP)
     message = ""
     try:
         while True:
@@ -109,7 +121,7 @@ def _jog(terminal: Terminal, driver: ServoDriver, servo: ServoCalibration) -> Se
                     session.mark_angle(terminal.line("joint angle here, in degrees (left and down positive): "))
                 elif key == "r":
                     driver.release(servo.channel)
-                    message = "released: the next move takes it up again"
+                    message = "released: the next move drives it again"
                 elif key in marks:
                     marks[key]()
                 else:
@@ -123,7 +135,7 @@ def _jog(terminal: Terminal, driver: ServoDriver, servo: ServoCalibration) -> Se
 def _visually(
     options: argparse.Namespace, old: Mapping[str, ServoCalibration], joints: Sequence[str]
 ) -> dict[str, ServoCalibration]:
-    # rclpy and OpenCV only where they are needed: by hand must work on a Pi without either
+    # imported here, since the calibration by hand must work on a Pi without rclpy and OpenCV
     from vergence_calibration.ros.head_view import HeadView
     from vergence_calibration.servos.visual import VisualParameters, calibrate_head
     from vergence_rig.camera import CameraModel
@@ -139,7 +151,7 @@ def _visually(
 
 def _write(options: argparse.Namespace, servos: Mapping[str, ServoCalibration]) -> int:
     text = servo_file.as_text(servos)
-    changes = kept_file.difference(options.servos, text)
+    changes = backed_up_file.difference(options.servos, text)
     if not changes or (options.servos.exists() and load_servos(options.servos) == servos):
         print("nothing to change")
         return 0
@@ -152,9 +164,9 @@ def _write(options: argparse.Namespace, servos: Mapping[str, ServoCalibration]) 
         except NoTerminalError:
             answer = ""
         if answer.lower() not in ("y", "yes"):
-            print("left as it was")
+            print("nothing was written")
             return 1
-    kept = kept_file.replace(options.servos, text)
+    kept = backed_up_file.replace(options.servos, text)
     print(f"wrote {options.servos}" + (f"; the old one is {kept}" if kept else ""))
     return 0
 
@@ -164,7 +176,7 @@ def _backend_values(settings: Sequence[str]) -> dict[str, Any]:
     for setting in settings:
         name, equals, text = setting.partition("=")
         if not equals:
-            raise ServoCalibrationError(f"--set is {setting!r}: allowed is KEY=VALUE, a parameter of the backend")
+            raise ServoCalibrationError(f"--set must be KEY=VALUE, a parameter of the servo driver: got {setting!r}")
         values[name] = yaml.safe_load(text)
     return values
 

@@ -1,4 +1,4 @@
-"""Other commanders of a running head: controllers are silenced through their own service, and woken again after."""
+"""Other nodes that command a running head: controllers are disabled through their own service, and restored after."""
 
 import threading
 import time
@@ -12,13 +12,13 @@ from std_srvs.srv import SetBool, Trigger
 from vergence_calibration.identification.axis_log import IdentifyError
 from vergence_msgs.msg import GazeState
 
-_SERVICE_PATIENCE_S = 10.0
+_SERVICE_TIMEOUT_S = 10.0
 _DISCOVERY_S = 3.0
 
 
 @dataclass(frozen=True)
-class Silenced:
-    """A controller that was told to be silent, and what it did before."""
+class PausedController:
+    """A controller that was disabled, and its state before."""
 
     name: str
     was_idle: bool
@@ -31,7 +31,7 @@ class Controllers:
     def __init__(self, node: Node, topic: str) -> None:
         self._node, self._topic = node, node.resolve_topic_name(topic)
         self._state: GazeState | None = None
-        self.silenced: list[Silenced] = []
+        self.paused: list[PausedController] = []
         node.create_subscription(GazeState, "gaze/state", self._on_state, 10)
 
     def others(self) -> list[str]:
@@ -40,19 +40,21 @@ class Controllers:
         names = {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos}
         return sorted(names - {self._node.get_fully_qualified_name()})
 
-    def silence(self) -> None:
-        """Disable every controller that can be, and keep in `silenced` which. Raises IdentifyError if one refuses."""
+    def pause(self) -> None:
+        """Disable every controller that can be, and record it in `paused`. Raises IdentifyError if one refuses."""
         for name in self._that_can_be():
             state = self._state
             idle = state is not None and state.phase == GazeState.PHASE_IDLE
             disabled = idle and state is not None and state.reason.startswith("disabled")
-            self.silenced.append(Silenced(name, idle, disabled))  # first: whoever interrupts this wakes it all the same
+            self.paused.append(
+                PausedController(name, idle, disabled)
+            )  # recorded first: an interrupt must not leave it disabled
             answer = call(self._node, SetBool, f"{name}/enable", SetBool.Request(data=False))
             if answer is None or not answer.success:
                 raise IdentifyError(f"{name} commands the joints and could not be disabled: stop it first")
 
     def _that_can_be(self) -> list[str]:
-        """Return the other commanders that can be disabled; services may become known after topics."""
+        """Return the other commanders that can be disabled; services may be discovered after topics."""
         deadline_s = time.monotonic() + _DISCOVERY_S
         while True:
             services = {name for name, _ in self._node.get_service_names_and_types()}
@@ -61,19 +63,19 @@ class Controllers:
                 return able
             time.sleep(0.1)
 
-    def wake(self) -> list[str]:
-        """Bring the silenced controllers back to what they did; return the names of those that do not answer."""
-        deaf = []
-        for controller in self.silenced:
+    def resume(self) -> list[str]:
+        """Restore the paused controllers' states; return the names of those that do not answer."""
+        unresponsive = []
+        for controller in self.paused:
             if controller.was_disabled:
                 continue
             answer = call(self._node, SetBool, f"{controller.name}/enable", SetBool.Request(data=True))
             if answer is not None and controller.was_idle:
-                # enabled, it would verge on what it sees: one that held still shall go on holding still
+                # an enabled controller would start to verge: one that was idle stays idle
                 answer = call(self._node, Trigger, f"{controller.name}/stop", Trigger.Request())
             if answer is None:
-                deaf.append(controller.name)
-        return deaf
+                unresponsive.append(controller.name)
+        return unresponsive
 
     def _on_state(self, message: GazeState) -> None:
         self._state = message
@@ -91,11 +93,11 @@ def call(node: Node, kind: Any, name: str, request: Any) -> Any:
     """Call a service while another thread spins `node`; None without an answer."""
     client = node.create_client(kind, name)
     try:
-        if not client.wait_for_service(_SERVICE_PATIENCE_S):
+        if not client.wait_for_service(_SERVICE_TIMEOUT_S):
             return None
         done = threading.Event()
         future = client.call_async(request)
         future.add_done_callback(lambda _: done.set())
-        return future.result() if done.wait(_SERVICE_PATIENCE_S) else None
+        return future.result() if done.wait(_SERVICE_TIMEOUT_S) else None
     finally:
         node.destroy_client(client)

@@ -1,4 +1,4 @@
-"""The running head, as the identification needs it: moves commanded, and everything recorded that comes meanwhile."""
+"""The running head for the identification: commands moves and records images and joint_states meanwhile."""
 
 import math
 import time
@@ -25,7 +25,7 @@ from vergence_rig.rig import JOINT_NAMES, Rig
 
 TRANSPORTS = ("auto", "raw", "compressed")
 
-_LISTEN_S = 0.6
+_CHECK_COMMANDS_S = 0.6
 _START_S = 1.0
 _FRAMES_AT_REST = 3
 _AHEAD_S, _OLD_S = 0.2, 5.0
@@ -35,14 +35,14 @@ _WHOLE_TURN_RAD = math.tau
 
 
 class IdentifiedHead(RunningHead):
-    """A head under way: on leaving the block the eyes are back where they were, and the controller is enabled again.
+    """A head in use: on leaving the block the eyes return to their pose, and the controller is enabled again.
 
-    `patience_s` is how long images, joint_states and whoever takes commands may keep it waiting.
+    `timeout_s` is the longest wait for images, joint_states and a subscriber of commands.
     """
 
-    def __init__(self, rig: Rig, namespace: str = "", transport: str = "auto", patience_s: float = 20.0) -> None:
+    def __init__(self, rig: Rig, namespace: str = "", transport: str = "auto", timeout_s: float = 20.0) -> None:
         super().__init__("vergence_identify", namespace, own_signals=True)
-        self._rig, self._transport, self._patience_s = rig, transport, patience_s
+        self._rig, self._transport, self._timeout_s = rig, transport, timeout_s
         self._controllers = Controllers(self.node, "joint_command")
         self._own_ns: deque[int] = deque(maxlen=500)
         self._foreign = 0
@@ -61,51 +61,51 @@ class IdentifiedHead(RunningHead):
     ) -> None:
         try:
             self._return()
-            deaf = self._controllers.wake()
-            if deaf:
-                self.node.get_logger().error(f"{', '.join(deaf)} did not answer and may still be disabled")
+            unresponsive = self._controllers.resume()
+            if unresponsive:
+                self.node.get_logger().error(f"{', '.join(unresponsive)} did not answer and may still be disabled")
         finally:
             super().__exit__(kind, error, trace)
 
     def begin(self) -> list[str]:
-        """Find cameras and servos, silence controllers, and make sure that nobody else commands.
+        """Find cameras and servos, disable controllers, and check that no other node commands.
 
-        Returns the names of the controllers that were silenced. Raises HeadError, IdentifyError.
+        Returns the names of the controllers that were disabled. Raises HeadError, IdentifyError.
         """
-        self.wait_for_servos(self._patience_s)
+        self.wait_for_servos(self._timeout_s)
         self._wait(lambda: len(self._present) == len(JOINT_NAMES), self._no_joints)
         self._subscribe_to_images()
         self._wait(lambda: all(self._newest.values()), self._no_images)
         self._check_clocks()
-        self._controllers.silence()
+        self._controllers.pause()
         time.sleep(0.1)  # commands on their way
         with self.arrival:
             self._foreign = 0
-        time.sleep(_LISTEN_S)
+        time.sleep(_CHECK_COMMANDS_S)
         self._check_alone()
         with self.arrival:
             self._before = dict(self._present)
-        # released servos start one after the other, and jump to where they are believed to be
-        self._rest(self.tell(self._before), _START_S)
-        return [controller.name for controller in self._controllers.silenced]
+        # released servos start one after the other, and jump to their estimated position
+        self._rest(self.command(self._before), _START_S)
+        return [controller.name for controller in self._controllers.paused]
 
     def cameras(self) -> dict[str, EyeCamera]:
-        """Return the cameras by eye: what camera_info says, else the rig."""
-        heard = self.heard_models()
+        """Return the cameras by eye: by camera_info, else by the rig."""
+        published = self.published_models()
         specs = {"left": self._rig.left_camera, "right": self._rig.right_camera}
-        return {eye: EyeCamera(heard.get(eye) or CameraModel(specs[eye]), eye in heard) for eye in EYES}
+        return {eye: EyeCamera(published.get(eye) or CameraModel(specs[eye]), eye in published) for eye in EYES}
 
     def record(self, joint: str, moves: Sequence[Move]) -> AxisLog:
         """See Head."""
         amplitude_rad = max(abs(move.angle_rad) for move in moves)
         pose = pose_with_room(self._rig, self._before, amplitude_rad)
-        self._rest(self.tell(pose), moves[0].rest_s)
+        self._rest(self.command(pose), moves[0].rest_s)
         with self.arrival:
             self._frames, self._reports = {eye: Frames() for eye in EYES}, []
         self._wait(lambda: all(f.stamps_s for f in (self._frames or {}).values()), self._no_images)
         commands = []
         for move in moves:
-            stamp_s = self.tell(pose | {joint: pose[joint] + move.angle_rad})
+            stamp_s = self.command(pose | {joint: pose[joint] + move.angle_rad})
             commands.append((stamp_s, move.angle_rad))
             self._rest(stamp_s, move.rest_s)
             time.sleep(move.share * self._interval_s())
@@ -117,7 +117,7 @@ class IdentifiedHead(RunningHead):
         return AxisLog(joint, np.array(commands), np.array(rows, float).reshape(-1, 2), frames)
 
     def owners(self) -> Owners:
-        """Return the nodes whose own parameters hold latencies, and what these are now."""
+        """Return the nodes that have latencies as parameters, and their values."""
         cameras = {}
         for eye, topic in self._topics.items():
             name = self._publisher(topic)
@@ -134,7 +134,7 @@ class IdentifiedHead(RunningHead):
         return names.pop() if len(names) == 1 else ""
 
     def _subscribe_to_images(self) -> None:
-        deadline_s = time.monotonic() + self._patience_s
+        deadline_s = time.monotonic() + self._timeout_s
         kinds: dict[str, Any] = {"raw": RawImage, "compressed": CompressedImage}
         for eye in EYES:
             names = {"raw": f"{eye}/image_raw", "compressed": f"{eye}/image_raw/compressed"}
@@ -142,7 +142,7 @@ class IdentifiedHead(RunningHead):
             while not (offered := [name for name in wanted if self.node.count_publishers(names[name])]):
                 if time.monotonic() > deadline_s:
                     raise IdentifyError(
-                        f"nobody publishes {' or '.join(names[name] for name in wanted)}: start the cameras first"
+                        f"no node publishes {' or '.join(names[name] for name in wanted)}: start the cameras first"
                     )
                 time.sleep(0.05)
             self._topics[eye] = names[offered[0]]
@@ -173,7 +173,7 @@ class IdentifiedHead(RunningHead):
     def _on_joints(self, message: JointState) -> None:
         positions = {
             name: position
-            for name, position in zip(message.name, message.position)  # noqa: B905 - a stranger's message
+            for name, position in zip(message.name, message.position)  # noqa: B905 - another node's message
             if name in JOINT_NAMES and abs(position) < _WHOLE_TURN_RAD
         }
         with self.arrival:
@@ -183,13 +183,13 @@ class IdentifiedHead(RunningHead):
             self.arrival.notify_all()
 
     def _on_command(self, message: JointState) -> None:
-        with self.telling:
+        with self.sending:
             own = to_nanoseconds(message.header.stamp) in self._own_ns
         if not own:
             self._foreign += 1
 
-    def on_told(self, stamp_ns: int) -> None:
-        """See RunningHead; called with `telling` held."""
+    def on_command_sent(self, stamp_ns: int) -> None:
+        """See RunningHead; called with `sending` held."""
         self._own_ns.append(stamp_ns)
 
     def _check_clocks(self) -> None:
@@ -197,7 +197,7 @@ class IdentifiedHead(RunningHead):
             age_s = self.now_s() - newest[-1]
             if not -_AHEAD_S <= age_s <= _OLD_S:
                 raise IdentifyError(
-                    f"{self._topics[eye]} has stamps {age_s:.1f} s old: allowed is {-_AHEAD_S:g} to {_OLD_S:g} s; do "
+                    f"stamps of {self._topics[eye]} must be {-_AHEAD_S:g} to {_OLD_S:g} s old: got {age_s:.1f} s; do "
                     "the machines' clocks agree (docs/two_machines.md)?"
                 )
 
@@ -205,12 +205,12 @@ class IdentifiedHead(RunningHead):
         if self._foreign:
             names = ", ".join(self._controllers.others()) or "an unknown node"
             raise IdentifyError(
-                f"joint_command has {self._foreign} commands of somebody else ({names}): allowed is none while the "
-                "head is identified; stop that node first"
+                f"joint_command must have no commands of other nodes during the identification: got {self._foreign} of "
+                f"{names}; stop that node first"
             )
 
     def _rest(self, since_s: float, rest_s: float) -> None:
-        """Wait until both eyes have images of the end of a rest; by their stamps, however late they come."""
+        """Wait until both eyes have images of the end of a rest; by their stamps, independent of their arrival."""
 
         def rested() -> bool:
             return all(
@@ -220,25 +220,25 @@ class IdentifiedHead(RunningHead):
 
         self._wait(rested, self._no_images)
 
-    def _wait(self, condition: Any, complaint: Any) -> None:
-        """Wait for a condition; the patience begins anew with every image."""
+    def _wait(self, condition: Any, explanation: Any) -> None:
+        """Wait for a condition; the time-out restarts with every image."""
         with self.arrival:
             while not condition():
                 counts = {eye: newest[-1:] for eye, newest in self._newest.items()}
-                if not self.arrival.wait_for(condition, self._patience_s):
+                if not self.arrival.wait_for(condition, self._timeout_s):
                     stuck = [eye for eye, newest in self._newest.items() if newest[-1:] == counts[eye]]
                     if stuck or not self._newest:
-                        raise IdentifyError(complaint(stuck))
+                        raise IdentifyError(explanation(stuck))
 
     def _no_images(self, stuck: Sequence[str]) -> str:
         if self._problem:
             return self._problem
         topics = " and ".join(self._topics.get(eye, f"{eye}/image_raw") for eye in stuck)
-        return f"no images on {topics} for {self._patience_s:g} s: allowed are some every second; do the cameras run?"
+        return f"no images on {topics} for {self._timeout_s:g} s; do the cameras run?"
 
     def _no_joints(self, stuck: Sequence[str]) -> str:
         missing = ", ".join(name for name in JOINT_NAMES if name not in self._present)
-        return f"no joint_states of {missing} for {self._patience_s:g} s: allowed are some; does servo_node run?"
+        return f"no joint_states of {missing} for {self._timeout_s:g} s; does servo_node run?"
 
     def _interval_s(self) -> float:
         with self.arrival:
@@ -248,12 +248,12 @@ class IdentifiedHead(RunningHead):
     def _return(self) -> None:
         if not self._before:
             return
-        self.tell(self._before)
+        self.command(self._before)
         deadline_s = time.monotonic() + _RETURN_S
         while time.monotonic() < deadline_s and not self._is_back():
             time.sleep(0.05)
         time.sleep(3 * REPEAT_S)
-        self.tell({})
+        self.command({})
 
     def _is_back(self) -> bool:
         with self.arrival:

@@ -1,4 +1,4 @@
-"""`vergence identify`: latencies, pixels per radian and signs of a running head, into the YAML that its nodes read."""
+"""`vergence identify`: measures latencies, pixels per radian and signs of a running head, and writes its YAML."""
 
 import argparse
 import signal
@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from vergence_calibration import kept_file
+from vergence_calibration import backed_up_file
 from vergence_calibration.identification.axis_log import IdentifyError, IdentifyParameters
 from vergence_calibration.identification.identification import Identification, identify
 from vergence_calibration.identification.identified_rig import identified_rig, nodes_text, rig_text
@@ -22,24 +22,29 @@ _REFUSED, _BAD_INPUT = 1, 2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `vergence identify`."""
-    parser.add_argument("--rig", default="", help="rig.yaml of the head; left out: the built-in rig")
+    parser.add_argument("--rig", default="", help="rig.yaml of the head (default: the built-in rig)")
     parser.add_argument("--out", type=Path, help="rig.yaml to write (default: that of --rig, else rig_identified.yaml)")
-    parser.add_argument("--axes", nargs="+", choices=JOINT_NAMES, default=list(JOINT_NAMES), help="only these")
-    parser.add_argument("--amplitude-deg", type=float, default=3.0, help="moves either way (default %(default)s)")
-    parser.add_argument("--steps", type=int, default=14, help="whole steps of each axis (default %(default)s)")
+    parser.add_argument(
+        "--axes", nargs="+", choices=JOINT_NAMES, default=list(JOINT_NAMES), help="axes to identify (default: all)"
+    )
+    parser.add_argument("--amplitude-deg", type=float, default=3.0, help="amplitude of the moves (default %(default)s)")
+    parser.add_argument("--steps", type=int, default=14, help="number of steps of each axis (default %(default)s)")
     parser.add_argument("--rest-s", type=float, default=0.45, help="rest after each move (default %(default)s)")
     parser.add_argument(
-        "--assume", choices=ASSUMPTIONS, default="stamps", help="what is right, the images' stamps or joint_states"
+        "--assume",
+        choices=ASSUMPTIONS,
+        default="stamps",
+        help="which are taken as correct, the images' stamps or joint_states (default %(default)s)",
     )
     parser.add_argument("--transport", choices=TRANSPORTS, default="auto", help="of the images (default %(default)s)")
-    parser.add_argument("--patience-s", type=float, default=20.0, help="wait for images so long (default %(default)s)")
+    parser.add_argument("--timeout-s", type=float, default=20.0, help="longest wait for images (default %(default)s)")
     parser.add_argument("--namespace", default="", help="the head's namespace, if it has one")
     parser.add_argument("--yes", action="store_true", help="write without asking")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Identify and write; 0 written, 1 refused or left as it was, 2 bad input."""
-    _listen_to_signals()
+    """Identify and write; returns 0 if written, 1 if refused or discarded, 2 for bad input."""
+    _raise_on_signals()
     try:
         return _identify(options)
     except KeyboardInterrupt:
@@ -58,16 +63,16 @@ def _identify(options: argparse.Namespace) -> int:
     rig = load_rig(options.rig)
     parameters = IdentifyParameters(amplitude_deg=options.amplitude_deg, steps=options.steps, rest_s=options.rest_s)
     out: Path = options.out or Path(options.rig or "rig_identified.yaml")
-    with IdentifiedHead(rig, options.namespace, options.transport, options.patience_s) as head:
+    with IdentifiedHead(rig, options.namespace, options.transport, options.timeout_s) as head:
         try:
             for name in head.begin():
-                _say(f"{name} is disabled meanwhile")
-            found = identify(head, options.axes, parameters, options.assume, _say)
+                _print(f"{name} is disabled during the identification")
+            found = identify(head, options.axes, parameters, options.assume, _print)
             owners = head.owners()
         finally:
-            _finish_undisturbed()
-    _listen_to_signals()
-    _say_latencies(found)
+            _ignore_signals()
+    _raise_on_signals()
+    _print_latencies(found)
     texts = {out: rig_text(identified_rig(rig, found), found, time.strftime("%Y-%m-%d %H:%M:%S"))}
     changes = node_parameters(found.latencies, owners)
     if changes:
@@ -75,30 +80,30 @@ def _identify(options: argparse.Namespace) -> int:
     return _write(texts, options.yes)
 
 
-def _listen_to_signals() -> None:
+def _raise_on_signals() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
 
 
-def _finish_undisturbed() -> None:
-    """Let nothing interrupt the eyes' way back and the controller's waking: both take a few seconds at most."""
+def _ignore_signals() -> None:
+    """Ignore interrupts while the eyes return and the controller is enabled: a few seconds at most."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
 
 
-def _write(texts: Mapping[Path, str], certain: bool) -> int:
+def _write(texts: Mapping[Path, str], overwrite: bool) -> int:
     for path, text in texts.items():
-        print(f"\n{kept_file.difference(path, text)}")
-    if not certain and not _agreed(f"\nwrite {' and '.join(map(str, texts))}? [y/N] "):
-        print("left as it was")
+        print(f"\n{backed_up_file.difference(path, text)}")
+    if not overwrite and not _confirmed(f"\nwrite {' and '.join(map(str, texts))}? [y/N] "):
+        print("nothing was written")
         return _REFUSED
     for path, text in texts.items():
-        kept = kept_file.replace(path, text)
+        kept = backed_up_file.replace(path, text)
         print(f"wrote {path}" + (f"; the old one is {kept}" if kept else ""))
     return 0
 
 
-def _agreed(question: str) -> bool:
+def _confirmed(question: str) -> bool:
     try:
         return input(question).strip().lower() in ("y", "yes")
     except EOFError:
@@ -106,26 +111,28 @@ def _agreed(question: str) -> bool:
         return False
 
 
-def _say(text: str) -> None:
+def _print(text: str) -> None:
     print(text, flush=True)
 
 
-def _say_latencies(found: Identification) -> None:
+def _print_latencies(found: Identification) -> None:
     latencies = found.latencies
-    _say(f"\nfrom a command to the arrival of a picture that shows it: {_ms(latencies.loop_s)}; of that")
+    _print(f"\ntime from a command to the arrival of an image that shows its motion: {_ms(latencies.loop_s)}")
     for eye, arrival in found.arrivals.items():
         worst = f"95 %: {1e3 * arrival.late_s:.1f}"
-        _say(f"  {eye} images arrive {1e3 * arrival.median_s:.1f} ms after their stamps ({worst})")
+        _print(f"  {eye} images arrive {1e3 * arrival.median_s:.1f} ms after their stamps ({worst})")
     if latencies.eyes_apart_s.known:
-        _say(f"  left stamps are late by {_ms(latencies.eyes_apart_s)} more than the right ones")
-    _say(f"if the {'image stamps' if latencies.assumption == 'stamps' else 'joint_states'} are right (--assume):")
+        _print(f"  left stamps are late by {_ms(latencies.eyes_apart_s)} more than the right ones")
+    _print(
+        f"with {'image stamps' if latencies.assumption == 'stamps' else 'joint_states'} taken as correct (--assume):"
+    )
     for joint, latency in latencies.servo_s.items():
         late = latencies.joints_late_s[joint]
-        behind = f"; its joint_states are {_ms(late)} late" if late.known else "; joint_states do not show its moves"
-        _say(f"  {joint} moves {_ms(latency)} after a command{behind}")
+        behind = f"; its joint_states are {_ms(late)} late" if late.known else "; joint_states do not show its motion"
+        _print(f"  {joint} moves {_ms(latency)} after a command{behind}")
     for eye, wait in latencies.exposure_to_arrival_s.items():
         if wait.known:
-            _say(f"  the {eye} camera takes {_ms(wait)} from exposure to arrival")
+            _print(f"  the {eye} camera takes {_ms(wait)} from exposure to arrival")
 
 
 def _ms(estimate: Estimate) -> str:

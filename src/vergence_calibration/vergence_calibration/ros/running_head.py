@@ -1,4 +1,4 @@
-"""A running head from outside: joints told over joint_command, camera calibrations heard."""
+"""A client of a running head: commands joints over joint_command, receives the cameras' calibrations."""
 
 import threading
 import time
@@ -23,30 +23,30 @@ Self = TypeVar("Self", bound="RunningHead")
 
 
 class HeadError(ValueError):
-    """A head that cannot be used: nobody takes commands, somebody else gives them, or no images come."""
+    """A head that cannot be used: no node subscribes to commands, another node publishes them, or no images come."""
 
 
 class RunningHead:
     """A node in a thread of its own. Commands are repeated 50 times a second, so that the servos do not time out.
 
-    With `own_signals` Ctrl-C stays the caller's: the node lives until the end of the block, to clean up with.
+    With `own_signals` the caller handles Ctrl-C: the node lives until the end of the block, for clean-up.
     """
 
     def __init__(self, name: str, namespace: str = "", own_signals: bool = False) -> None:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO if own_signals else None)
         self.node = Node(name, namespace=namespace or None)
         self.arrival = threading.Condition()
-        """Held while what came is changed or read, and notified after every change."""
+        """Held while received data is changed or read, and notified after every change."""
         self._infos: dict[str, CameraInfo] = {}
-        self._wanted_rad: dict[str, float] = {}
-        self.telling = threading.Lock()
+        self._commanded_rad: dict[str, float] = {}
+        self.sending = threading.Lock()
         """Held while a command is stamped and published."""
         self._command = self.node.create_publisher(JointState, "joint_command", STATE_QOS)
         for eye in EYES:
             self.node.create_subscription(
                 CameraInfo, f"{eye}/camera_info", lambda message, eye=eye: self._infos.update({eye: message}), IMAGE_QOS
             )
-        self.node.create_timer(REPEAT_S, self._tell)
+        self.node.create_timer(REPEAT_S, self._repeat_command)
         self._ending = threading.Event()
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
@@ -59,7 +59,7 @@ class RunningHead:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        # first the thread: an executor that is shut down under it fails in the middle of its waiting
+        # the thread ends first: an executor that is shut down while it waits raises
         self._ending.set()
         self._thread.join(timeout=10.0)
         self._executor.shutdown(timeout_sec=1.0)
@@ -70,13 +70,13 @@ class RunningHead:
         """Return the node's time [s]."""
         return float(self.node.get_clock().now().nanoseconds) * 1e-9
 
-    def tell(self, joints_rad: Mapping[str, float]) -> float:
-        """Command joints [rad] now and until told otherwise; return the command's stamp [s]. Empty: say nothing."""
-        with self.telling:
-            self._wanted_rad = dict(joints_rad)
+    def command(self, joints_rad: Mapping[str, float]) -> float:
+        """Command joints [rad] from now on; return the command's stamp [s]. Empty: stop sending."""
+        with self.sending:
+            self._commanded_rad = dict(joints_rad)
             return self._publish()
 
-    def heard_models(self) -> dict[str, CameraModel]:
+    def published_models(self) -> dict[str, CameraModel]:
         """Return the models of the cameras that publish a calibration."""
         models = {}
         for eye, info in list(self._infos.items()):
@@ -85,36 +85,36 @@ class RunningHead:
                     info.width, info.height, list(info.k), list(info.d), info.distortion_model
                 )
             except CameraModelError:
-                continue  # not calibrated: the rig's figures do
+                continue  # not calibrated: the rig's values are used
         return models
 
-    def wait_for_servos(self, patience_s: float) -> None:
-        """Wait until somebody else takes commands. Raises HeadError."""
-        deadline_s = time.monotonic() + patience_s
-        while not self._takers():
+    def wait_for_servos(self, timeout_s: float) -> None:
+        """Wait until another node subscribes to commands. Raises HeadError."""
+        deadline_s = time.monotonic() + timeout_s
+        while not self._subscribers():
             if time.monotonic() > deadline_s:
-                raise HeadError("nobody takes joint_command: start servo_node (or sim_node) first")
+                raise HeadError("no node subscribes to joint_command: start servo_node (or sim_node) first")
             time.sleep(0.05)
 
-    def on_told(self, stamp_ns: int) -> None:
-        """Know that a command with this stamp goes out now."""
+    def on_command_sent(self, stamp_ns: int) -> None:
+        """Called before a command with this stamp is published."""
 
-    def _takers(self) -> list[str]:
+    def _subscribers(self) -> list[str]:
         infos = self.node.get_subscriptions_info_by_topic(self._command.topic_name)
         return [info.node_name for info in infos if info.node_name != self.node.get_name()]
 
-    def _tell(self) -> None:
-        with self.telling:
-            if self._wanted_rad:
+    def _repeat_command(self) -> None:
+        with self.sending:
+            if self._commanded_rad:
                 self._publish()
 
     def _publish(self) -> float:
-        # Stamped under the lock: servo_node refuses stamps that run backwards.
+        # Stamped under the lock: servo_node refuses stamps that decrease.
         stamp = self.node.get_clock().now().to_msg()
-        if self._wanted_rad:
-            message = JointState(name=list(self._wanted_rad), position=list(self._wanted_rad.values()))
+        if self._commanded_rad:
+            message = JointState(name=list(self._commanded_rad), position=list(self._commanded_rad.values()))
             message.header.stamp = stamp
-            self.on_told(to_nanoseconds(stamp))
+            self.on_command_sent(to_nanoseconds(stamp))
             self._command.publish(message)
         return to_nanoseconds(stamp) * 1e-9
 

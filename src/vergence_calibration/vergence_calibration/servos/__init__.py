@@ -1,1 +1,1 @@
-"""Finding a servo's calibration: by hand in a terminal, or by what the cameras see."""
+"""Calibration of servos: by hand in a terminal, or from the cameras' images."""

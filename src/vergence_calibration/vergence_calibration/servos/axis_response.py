@@ -1,4 +1,4 @@
-"""What a servo does with small moves, from commanded pulses and the angles that were seen."""
+"""A servo's response to small moves, from the pulses sent and the angles seen."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ _GAINS_RAD_PER_US = (math.radians(0.02), math.radians(0.35))
 
 @dataclass(frozen=True)
 class AxisResponse:
-    """sign of the gain, its size [rad/us], lost motion (dead band plus backlash) [rad], and how well it fits [rad]."""
+    """Sign and size of the gain [rad/us], lost motion (dead band plus backlash) [rad], and RMS residual [rad]."""
 
     sign: int
     gain_rad_per_us: float
@@ -39,12 +39,12 @@ def axis_response(pulses_us: Sequence[float], angles_rad: Sequence[float]) -> Ax
     low, high = _GAINS_RAD_PER_US
     if not low <= abs(loop.gain) <= high:
         raise ServoCalibrationError(
-            f"the eye turned by {math.degrees(loop.gain):+.4f} degrees per us: allowed is {math.degrees(low):.2f} to "
-            f"{math.degrees(high):.2f} either way (is the right servo plugged in, and does the camera see enough?)"
+            f"the eye must turn by {math.degrees(low):.2f} to {math.degrees(high):.2f} degrees per us in either "
+            f"direction: got {math.degrees(loop.gain):+.4f} (is the right servo plugged in, and the scene textured?)"
         )
     if loop.residual > 0.25 * abs(loop.gain) * (max(pulses_us) - min(pulses_us)):
         raise ServoCalibrationError(
-            f"what was seen does not follow the pulses (off by {math.degrees(loop.residual):.2f} degrees)"
+            f"the eye does not follow the pulses (residual {math.degrees(loop.residual):.2f} degrees)"
         )
     return AxisResponse(1 if loop.gain > 0 else -1, abs(loop.gain), loop.lost, loop.residual, loop.samples)
 
@@ -52,7 +52,7 @@ def axis_response(pulses_us: Sequence[float], angles_rad: Sequence[float]) -> Ax
 def calibrated(old: ServoCalibration, response: AxisResponse, offset_rad: float = 0.0) -> ServoCalibration:
     """Return the calibration with the response's sign, gain, dead band and backlash.
 
-    Joint angle 0 stays at its pulse, corrected by `offset_rad`: where the joint really was when it was told 0. Dead
+    Joint angle 0 stays at its pulse, corrected by `offset_rad`: the joint's true angle when it was commanded to 0. Dead
     band and backlash share the lost motion as they do in `old`. Raises ServoCalibrationError.
     """
     centre_us = old.pulse_us(0.0) - response.sign * offset_rad / response.gain_rad_per_us
@@ -63,7 +63,7 @@ def calibrated(old: ServoCalibration, response: AxisResponse, offset_rad: float 
     while centre_us - half_us < 300.0 or centre_us + half_us > 2700.0:
         reach_rad, half_us = 0.9 * reach_rad, 0.9 * half_us
         if reach_rad < math.radians(5.0):
-            raise ServoCalibrationError(f"joint angle 0 would be at {centre_us:.0f} us: no servo reaches that")
+            raise ServoCalibrationError(f"joint angle 0 must be within a servo's pulses: got {centre_us:.0f} us")
     try:
         return old.replaced(
             angles_rad=(-reach_rad, reach_rad),

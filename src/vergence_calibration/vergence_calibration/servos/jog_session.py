@@ -1,4 +1,4 @@
-"""Calibrating one servo by hand: what the keys do, what has been recorded, and the calibration that follows."""
+"""Calibration of one servo by hand: the keys' actions, the recorded marks, and the resulting calibration."""
 
 import math
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from vergence_rig.parameters import ParameterError
 from vergence_servo.calibration import ServoCalibration, ServoCalibrationError
 
 ABSOLUTE_US = (500.0, 2500.0)
-"""No jogging beyond these, whatever the file says: servos may reach their stops earlier still."""
+"""Limits of jogging, independent of the file: servos may reach their stops earlier still."""
 STEPS_US = {"left": -10.0, "right": 10.0, "down": -1.0, "up": 1.0, "page_down": -50.0, "page_up": 50.0}
 _LEAST_RANGE_US = 200.0
 _LEAST_ANGLE_RAD = math.radians(10.0)
@@ -16,7 +16,7 @@ _LEAST_ANGLE_RAD = math.radians(10.0)
 
 @dataclass
 class JogSession:
-    """Pulses sent and marks made for one servo. `send` is given every pulse; it returns what was really sent [us]."""
+    """Pulses sent and marks made for one servo. `send` sends a pulse and returns it on the driver's grid [us]."""
 
     old: ServoCalibration
     send: Callable[[float], float]
@@ -35,15 +35,15 @@ class JogSession:
             self.pulse_us = self.send(self._inside(self.pulse_us + STEPS_US[key]))
 
     def mark_minimum(self) -> None:
-        """The shortest pulse that the mechanics bear."""
+        """Record the shortest pulse that the mechanics allow."""
         self.minimum_us = self.pulse_us
 
     def mark_centre(self) -> None:
-        """Joint angle 0: the eye looks straight ahead."""
+        """Record joint angle 0: the eye looks straight ahead."""
         self.centre_us = self.pulse_us
 
     def mark_maximum(self) -> None:
-        """The longest pulse that the mechanics bear."""
+        """Record the longest pulse that the mechanics allow."""
         self.maximum_us = self.pulse_us
 
     def mark_angle(self, degrees: str) -> None:
@@ -51,9 +51,9 @@ class JogSession:
         try:
             angle_rad = math.radians(float(degrees.replace(",", ".")))
         except ValueError:
-            raise ServoCalibrationError(f"angle is {degrees!r}: allowed is a number of degrees") from None
+            raise ServoCalibrationError(f"angle must be a number of degrees: got {degrees!r}") from None
         if not abs(angle_rad) <= math.pi / 2:
-            raise ServoCalibrationError(f"angle is {degrees} degrees: allowed is -90 to 90")
+            raise ServoCalibrationError(f"angle must be -90 to 90 degrees: got {degrees}")
         self.angles = [mark for mark in self.angles if abs(mark[0] - angle_rad) > 1e-6] + [(angle_rad, self.pulse_us)]
 
     @property
@@ -64,7 +64,7 @@ class JogSession:
         return absent + (["two angles"] if len(self.angles) < 2 else [])
 
     def result(self) -> ServoCalibration:
-        """Return the calibration that the marks make. Raises ServoCalibrationError where they make none."""
+        """Return the calibration of the marks. Raises ServoCalibrationError if they are incomplete."""
         if self.missing:
             raise ServoCalibrationError(f"not recorded yet: {', '.join(self.missing)}")
         assert self.minimum_us is not None
@@ -73,20 +73,18 @@ class JogSession:
         low_us, high_us = sorted((self.minimum_us, self.maximum_us))
         if high_us - low_us < _LEAST_RANGE_US:
             raise ServoCalibrationError(
-                f"minimum and maximum are {high_us - low_us:g} us apart: allowed is {_LEAST_RANGE_US:g}"
+                f"minimum and maximum must be at least {_LEAST_RANGE_US:g} us apart: got {high_us - low_us:g}"
             )
         if not low_us < self.centre_us < high_us:
-            raise ServoCalibrationError(
-                f"centre is {self.centre_us:g} us: allowed is between {low_us:g} and {high_us:g} us"
-            )
+            raise ServoCalibrationError(f"centre must be between {low_us:g} and {high_us:g} us: got {self.centre_us:g}")
         marks = self._marks_with_centre()
         joint_rad, pulses_us = zip(*sorted(marks, key=lambda mark: mark[1]), strict=True)
         if max(joint_rad) - min(joint_rad) < _LEAST_ANGLE_RAD:
-            raise ServoCalibrationError("the angles lie within 10 degrees: record them further apart")
+            raise ServoCalibrationError("the angles must span at least 10 degrees: record them further apart")
         sign = 1 if joint_rad[-1] > joint_rad[0] else -1
         shaft_rad = tuple(sign * angle for angle in joint_rad)
         if list(shaft_rad) != sorted(shaft_rad):
-            raise ServoCalibrationError("the angles neither rise nor fall with the pulses: one of them is wrong")
+            raise ServoCalibrationError("the angles must increase or decrease with the pulses: one of them is wrong")
         try:
             fresh = self.old.replaced(
                 angles_rad=shaft_rad,
@@ -107,9 +105,7 @@ class JogSession:
         assert self.centre_us is not None
         at_zero = [pulse for angle, pulse in self.angles if abs(angle) < 1e-6]
         if at_zero and abs(at_zero[0] - self.centre_us) > 5.0:
-            raise ServoCalibrationError(
-                f"angle 0 was recorded at {at_zero[0]:g} us and the centre at {self.centre_us:g} us"
-            )
+            raise ServoCalibrationError(f"angle 0 must be at the centre, {self.centre_us:g} us: got {at_zero[0]:g} us")
         return [mark for mark in self.angles if abs(mark[0]) >= 1e-6] + [(0.0, self.centre_us)]
 
     def table(self) -> list[str]:

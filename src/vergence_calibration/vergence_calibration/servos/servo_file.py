@@ -8,11 +8,11 @@ import yaml
 
 from vergence_servo.calibration import PRESETS, ServoCalibration, servos_from_mapping
 
-_HEAD = "# Written by calibrate_servos; the file before it lies beside it. Keys: docs/servos.md\n"
+_HEAD = "# Written by calibrate_servos; the old file is kept beside it. Keys: docs/servos.md\n"
 
 
 def as_text(servos: Mapping[str, ServoCalibration]) -> str:
-    """Return servos.yaml for these servos: every figure that is neither the preset's nor the default."""
+    """Return servos.yaml for these servos: every value that is neither the preset's nor the default."""
     document = {"servos": {name: _entries(servo) for name, servo in servos.items()}}
     servos_from_mapping(document)  # what is written can be read again
     return _HEAD + yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)

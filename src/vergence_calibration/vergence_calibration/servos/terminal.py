@@ -1,4 +1,4 @@
-"""Keys without Enter, lines with it, and a table that is drawn over itself, on any terminal."""
+"""Reads keys and lines from a terminal, and draws a table in place."""
 
 import os
 import select
@@ -20,11 +20,11 @@ _SEQUENCES = {
     "[5~": "page_up",
     "[6~": "page_down",
 }
-_SEQUENCE_PATIENCE_S = 0.05
+_SEQUENCE_TIMEOUT_S = 0.05
 
 
 class NoTerminalError(ValueError):
-    """Standard input is not a terminal: nobody can press keys."""
+    """Standard input is not a terminal: keys cannot be read."""
 
 
 class Terminal:
@@ -32,7 +32,7 @@ class Terminal:
 
     def __init__(self) -> None:
         if not sys.stdin.isatty():
-            raise NoTerminalError("standard input is not a terminal: allowed is an interactive one (ssh -t)")
+            raise NoTerminalError("standard input must be an interactive terminal (ssh -t)")
         self._drawn = 0
 
     @contextmanager
@@ -53,7 +53,7 @@ class Terminal:
         if first != "\x1b":
             return first
         sequence = ""
-        while select.select([sys.stdin.fileno()], [], [], _SEQUENCE_PATIENCE_S)[0] and sequence not in _SEQUENCES:
+        while select.select([sys.stdin.fileno()], [], [], _SEQUENCE_TIMEOUT_S)[0] and sequence not in _SEQUENCES:
             sequence += self._read()
         return _SEQUENCES.get(sequence, "escape")
 
@@ -75,8 +75,8 @@ class Terminal:
         self._drawn = 0
         return text.strip()
 
-    def say(self, text: str) -> None:
-        """Print a line for good."""
+    def print_line(self, text: str) -> None:
+        """Print a line that stays."""
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
         self._drawn = 0

@@ -1,4 +1,4 @@
-"""Whether every axis turns the eye it should, the way it should; and what to change where not."""
+"""Checks that every axis turns the right eye in the right direction, and says what to change where not."""
 
 import math
 from collections.abc import Mapping
@@ -13,8 +13,8 @@ Array = npt.NDArray[np.float64]
 
 _LEAST_SLOPE = 0.15
 _MOST_CROSS_TALK = 0.2
-_LEAST_LIKENESS = 0.9
-_MOST_UNRELATED, _UNRELATED_PLAY_RAD = 0.4, math.radians(0.3)
+_LEAST_SIMILARITY = 0.9
+_MOST_UNRELATED, _UNRELATED_BACKLASH_RAD = 0.4, math.radians(0.3)
 
 # Rows: left and right eye; columns: pan and tilt.
 _PATTERNS: dict[str, Array] = {
@@ -29,8 +29,8 @@ _PATTERNS: dict[str, Array] = {
 _DIRECTIONS = {"pan_left": ("left", "right"), "pan_right": ("left", "right"), "tilt": ("down", "up")}
 
 
-def complaints(responses: Mapping[str, Response]) -> list[str]:
-    """Return one sentence for every thing that is connected or mounted wrongly; none if all is as it should be."""
+def wiring_faults(responses: Mapping[str, Response]) -> list[str]:
+    """Return one sentence for each fault of connection or mounting; none if all is right."""
     found = {joint: _pattern(response) for joint, response in responses.items()}
     upside_down = _upside_down(responses, found)
     lines = []
@@ -42,27 +42,29 @@ def complaints(responses: Mapping[str, Response]) -> list[str]:
     if swapped:
         lines.insert(0, _swap(swapped, responses))
     if upside_down:
-        lines.insert(0, f"the {upside_down} camera is mounted upside down: what it sees moves the wrong way both ways")
+        lines.insert(
+            0, f"the {upside_down} camera is mounted upside down: its image moves the wrong way in both directions"
+        )
     return lines
 
 
 def cross_talk(response: Response) -> float:
-    """Return the greatest slope where there should be none, as a share of the axis's own."""
+    """Return the largest slope of the other directions, relative to the axis's own."""
     own = _PATTERNS[response.joint] > 0
     return float(np.abs(response.slopes[~own]).max() / np.abs(response.slopes[own]).mean())
 
 
 def _pattern(response: Response) -> tuple[str, int]:
-    """Return the pattern that the response is most like, and its sign; "" if it is like none, "still" if none moves."""
+    """Return the most similar pattern and its sign; "" if none is similar, "still" if nothing moves."""
     slopes = response.slopes
     size = float(np.linalg.norm(slopes))
     if float(np.abs(slopes).max()) < _LEAST_SLOPE:
         return "still", 0
-    likeness = {name: float((slopes * p).sum()) / size / float(np.linalg.norm(p)) for name, p in _PATTERNS.items()}
-    best = max(likeness, key=lambda name: abs(likeness[name]))
-    if abs(likeness[best]) < _LEAST_LIKENESS:
+    similarity = {name: float((slopes * p).sum()) / size / float(np.linalg.norm(p)) for name, p in _PATTERNS.items()}
+    best = max(similarity, key=lambda name: abs(similarity[name]))
+    if abs(similarity[best]) < _LEAST_SIMILARITY:
         return "", 0
-    return best, 1 if likeness[best] > 0 else -1
+    return best, 1 if similarity[best] > 0 else -1
 
 
 def _upside_down(responses: Mapping[str, Response], found: Mapping[str, tuple[str, int]]) -> str:
@@ -84,31 +86,31 @@ def _swap(joints: list[str], responses: Mapping[str, Response]) -> str:
     )
     return (
         f"{moved}: the cameras or the pan servos are swapped; exchange left_device and right_device of the cameras, or "
-        "the channels of pan_left and pan_right in servos.yaml (which of the two, nothing seen here tells)"
+        "the channels of pan_left and pan_right in servos.yaml (the images cannot show which of the two)"
     )
 
 
 def _of_one(joint: str, response: Response, pattern: str, sign: int, upside_down: str) -> str:
-    reach = f"told {math.degrees(response.amplitude_rad):+.1f} degrees"
+    reach = f"commanded {math.degrees(response.amplitude_rad):+.1f} degrees"
     unrelated_rad = float(response.unrelated_rad.max())
-    allowed_rad = _MOST_UNRELATED * response.amplitude_rad + _UNRELATED_PLAY_RAD
+    allowed_rad = _MOST_UNRELATED * response.amplitude_rad + _UNRELATED_BACKLASH_RAD
     if unrelated_rad > allowed_rad:
         return (
-            f"what the eyes see while {joint} moves is {math.degrees(unrelated_rad):.1f} degrees off what that would "
-            f"show: allowed is {math.degrees(allowed_rad):.1f}; something moves in view, or the whole head does"
+            f"the images' motion while {joint} moves must follow it to {math.degrees(allowed_rad):.1f} degrees: got "
+            f"{math.degrees(unrelated_rad):.1f}; something moves in view, or the whole head does"
         )
     if pattern == "still":
         most = float(np.abs(response.slopes).max())
         return (
-            f"{joint} does not move what the eyes see: {reach}, they turned by {most:.0%} of it, allowed is "
-            f"{_LEAST_SLOPE:.0%} or more; is its servo powered, enabled, plugged in and free to move?"
+            f"{joint} does not move the images: {reach}, the eyes must turn by {_LEAST_SLOPE:.0%} or more of it: got "
+            f"{most:.0%}; is its servo powered, enabled, plugged in and free to move?"
         )
     if pattern.endswith("on its side"):
         return f"{joint} moves the {pattern.split()[0]} image up and down: that camera is mounted on its side"
     if pattern == "both pan":
         return f"{joint} turns both eyes to the side: its servo turns the whole head, or both topics show one camera"
     if _is_swapped(joint, (pattern, sign)) and joint != "tilt":
-        return ""  # said for both pans at once
+        return ""  # reported for both pans at once
     if pattern == "one eye upside down":
         return "" if upside_down and joint == "tilt" else _unclear(joint, response, reach)
     if pattern == "":
@@ -126,8 +128,8 @@ def _of_one(joint: str, response: Response, pattern: str, sign: int, upside_down
     talk = cross_talk(response)
     if talk > _MOST_CROSS_TALK:
         return (
-            f"{joint} also turns an eye as it should not, by {talk:.0%} of its own motion: allowed is "
-            f"{_MOST_CROSS_TALK:.0%}; is a camera rolled, or something loose?"
+            f"{joint} must turn an eye in other directions by at most {_MOST_CROSS_TALK:.0%} of its own motion: got "
+            f"{talk:.0%}; is a camera rolled, or something loose?"
         )
     return ""
 
@@ -144,4 +146,4 @@ def _unclear(joint: str, response: Response, reach: str) -> str:
 def _told(response: Response, pattern: Array) -> str:
     seen = float((response.slopes * pattern).sum() / pattern.sum())
     amplitude = math.degrees(response.amplitude_rad)
-    return f"told {amplitude:+.1f} degrees, seen {seen * amplitude:+.1f}"
+    return f"commanded {amplitude:+.1f} degrees, seen {seen * amplitude:+.1f}"

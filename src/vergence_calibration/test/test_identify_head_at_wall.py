@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
+from vergence_calibration.backed_up_file import replace as replace_file
 from vergence_calibration.eye_turn import Image
 from vergence_calibration.identification.axis_log import (
     EYES,
@@ -24,7 +25,6 @@ from vergence_calibration.identification.identification import Identification, i
 from vergence_calibration.identification.identified_rig import identified_rig, nodes_text, rig_text
 from vergence_calibration.identification.pose import pose_with_room
 from vergence_calibration.identification.seen_motion import shrunk, shrunk_camera
-from vergence_calibration.kept_file import replace as replace_file
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.goals.goal import Goal, GoalKind
 from vergence_gaze.parameter_groups import gaze_parameters
@@ -79,13 +79,13 @@ class WallHead:
         self.texture, self.now_s = wall(), 0.0
         self.random = np.random.default_rng(2)
         self.events = [(0.0, "left"), (0.007, "right"), (0.003, "joints")]
-        self.told: list[dict[str, float]] = []
+        self.commanded: list[dict[str, float]] = []
 
     def cameras(self) -> dict[str, EyeCamera]:
         return {eye: EyeCamera(CameraModel(self.focal), self.calibrated) for eye in EYES}
 
-    def _tell(self, joints_rad: dict[str, float]) -> None:
-        self.told.append(joints_rad)
+    def _drive(self, joints_rad: dict[str, float]) -> None:
+        self.commanded.append(joints_rad)
         for servo, (joint, sign) in self.wires.items():
             self.plants[servo].command(sign * joints_rad[joint], self.now_s)
         for joint, angle in joints_rad.items():
@@ -111,13 +111,13 @@ class WallHead:
         reports: list[tuple[float, float]] = []
         amplitude_rad = max(abs(move.angle_rad) for move in moves)
         pose = pose_with_room(default_rig(), dict.fromkeys(JOINT_NAMES, 0.0), amplitude_rad)
-        self._tell(pose)
+        self._drive(pose)
         self._run(self.now_s + 0.3, joint, {eye: Frames() for eye in EYES}, [])
         self._run(self.now_s + 0.1, joint, frames, reports)
         commands = []
         for move in moves:
             commands.append((self.now_s, move.angle_rad))
-            self._tell(pose | {joint: pose[joint] + move.angle_rad})
+            self._drive(pose | {joint: pose[joint] + move.angle_rad})
             self._run(self.now_s + move.rest_s + move.share * self.frame_s, joint, frames, reports)
         return AxisLog(joint, np.array(commands), np.array(reports), frames)
 
@@ -167,14 +167,14 @@ CROSSED = {"pan_left": ("pan_right", 1.0), "pan_right": ("pan_left", 1.0), "tilt
          "^pan_left moves the right image .* exchange left_device and right_device"),
         (WallHead(wires=CROSSED), ("pan_left",), "^pan_left moves the right image .* the channels of"),
         (WallHead(wires={n: (n, 0.0 if n == "pan_right" else 1.0) for n in JOINT_NAMES}), ("pan_right",),
-         "^pan_right does not move what the eyes see: .*powered"),
+         "^pan_right does not move the images: .*powered"),
         (WallHead(picture=lambda picture, now_s: np.full_like(picture, 90)), ("tilt",),
-         "^tilt, left eye: 0 features in the image: allowed are 25 or more"),
-        (WallHead(blind="right"), ("pan_left",), "^pan_left, right eye: 0 images .* allowed are 8 or more"),
+         "^tilt, left eye: the image must have 25 or more features: got 0"),
+        (WallHead(blind="right"), ("pan_left",), "^pan_left, right eye: 8 or more images .* got 0"),
         (WallHead(focal=replace(CAMERA, fx_px=400.0, fy_px=400.0)), ("pan_left",),
-         r"^pan_left, left eye: 2\d\d px per radian told: allowed is 300 to 500, .*calibrate_servos --visual"),
-        (WallHead(), ("pan_left", "pan_left"), "^axes are pan_left, pan_left: allowed are .* each once"),
-        (WallHead(), ("roll",), "^axes are roll"),
+         r"^pan_left, left eye: px per radian commanded must be 300 to 500, .* got 2\d\d; .*calibrate_servos --visual"),
+        (WallHead(), ("pan_left", "pan_left"), "^axes must be .* each once: got pan_left, pan_left"),
+        (WallHead(), ("roll",), "^axes must be .*: got roll"),
     ],
 )  # fmt: skip
 def test_heads_that_are_wrong_are_refused_in_one_line(head: WallHead, axes: tuple[str, ...], text: str):
@@ -216,9 +216,9 @@ def test_an_uncalibrated_cameras_focal_length_is_measured():
 def test_no_command_leaves_the_limits():
     head = WallHead()
     found_by(head, "pan_left")
-    for told in head.told:
-        assert told["pan_right"] - told["pan_left"] >= 0
-        assert all(abs(angle) < 7 * DEG for angle in told.values())
+    for commanded in head.commanded:
+        assert commanded["pan_right"] - commanded["pan_left"] >= 0
+        assert all(abs(angle) < 7 * DEG for angle in commanded.values())
 
 
 def test_large_pictures_are_made_small_and_keep_their_angles():
@@ -228,7 +228,7 @@ def test_large_pictures_are_made_small_and_keep_their_angles():
     model = shrunk_camera(camera, small)
     # the middle of a block of 2x2 px lies half a pixel beyond the first one's
     assert model.angles([[10.0, 20.0]]) == pytest.approx(camera.angles([[20.5, 40.5]]))
-    with pytest.raises(IdentifyError, match="640x480 px, the pictures are shaped 320:180"):
+    with pytest.raises(IdentifyError, match="aspect ratio 320:180: camera_info is for 640x480"):
         shrunk_camera(camera, np.zeros((180, 320), np.uint8))
 
 

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_calibration import kept_file
+from vergence_calibration import backed_up_file
 from vergence_calibration.eye_turn import Image, NoMotionSeenError, azimuth_difference, eye_turn
 from vergence_calibration.lost_motion import staircase
 from vergence_calibration.servos import servo_file
@@ -85,9 +85,9 @@ def test_a_servo_mounted_the_other_way_gets_the_other_sign():
         (lambda: recorded({-45: 980}), "two angles"),
         (lambda: recorded({-45: 980, 45: 1980}, minimum=1450, maximum=1520), "apart"),
         (lambda: recorded({-45: 980, 45: 1980}, centre=2300), "between"),
-        (lambda: recorded({-2: 1450, 2: 1510}), "within 10 degrees"),
-        (lambda: recorded({-45: 1980, 45: 2000}), "neither rise nor fall"),
-        (lambda: recorded({-45: 980, 45: 1980, 0: 1550}), "angle 0 was recorded"),
+        (lambda: recorded({-2: 1450, 2: 1510}), "at least 10 degrees"),
+        (lambda: recorded({-45: 1980, 45: 2000}), "must increase or decrease"),
+        (lambda: recorded({-45: 980, 45: 1980, 0: 1550}), "angle 0 must be at the centre"),
         (lambda: recorded({-45: 1470, 45: 1490}), "us per rad"),
     ],
 )
@@ -118,12 +118,14 @@ def test_what_is_written_can_be_read_and_the_old_file_is_kept(tmp_path: Path):
     path = tmp_path / "servos.yaml"
     servos = default_servos() | {"tilt": recorded({-45: 1980, 45: 980}).result()}
     text = servo_file.as_text(servos)
-    assert kept_file.replace(path, text) is None
+    assert backed_up_file.replace(path, text) is None
     read = load_servos(path)
     assert read["pan_left"] == servos["pan_left"]
     assert read["tilt"].pulse_us(0.3) == pytest.approx(servos["tilt"].pulse_us(0.3), abs=1e-3)
-    assert "+    channel: 9" in kept_file.difference(path, text.replace("channel: 4", "channel: 9")).replace(", ", "\n")
-    kept = [kept_file.replace(path, text), kept_file.replace(path, text)]
+    assert "+    channel: 9" in backed_up_file.difference(path, text.replace("channel: 4", "channel: 9")).replace(
+        ", ", "\n"
+    )
+    kept = [backed_up_file.replace(path, text), backed_up_file.replace(path, text)]
     assert len(set(kept)) == 2
     assert all(old is not None and old.read_text() == text for old in kept)
     assert sorted(p.suffix for p in tmp_path.iterdir()) == [".bak", ".bak", ".yaml"]
@@ -201,7 +203,7 @@ def test_saying_no_leaves_the_file(tmp_path: Path):
     terminal.press("\n")
     terminal.expect("write ")
     terminal.press("n\n")
-    terminal.expect("left as it was")
+    terminal.expect("nothing was written")
     terminal.close()
     assert terminal.process.returncode == 1
     assert not path.exists()
@@ -215,8 +217,8 @@ def played(servo: ServoCalibration, plant: ServoSpec, sign: int, gain: float, am
     random = np.random.default_rng(3)
     shaft = ServoPlant(plant, 0.0)
     pulses, angles, now_s = [], [], 0.0
-    for told_rad in staircase(amplitude_deg * DEG, 10, 2):
-        pulse_us = servo.pulse_us(told_rad)
+    for commanded_rad in staircase(amplitude_deg * DEG, 10, 2):
+        pulse_us = servo.pulse_us(commanded_rad)
         shaft.command(sign * gain * (pulse_us - 1500.0), now_s)
         now_s += 1.0
         pulses.append(pulse_us)
@@ -248,7 +250,7 @@ def test_an_offset_moves_the_centre_the_right_way():
     pulses, angles = played(ServoCalibration(channel=0), SG90, -1, 0.1 * DEG, 6.0, 0.0)
     found = axis_response(pulses, angles)
     better = calibrated(ServoCalibration(channel=0), found, offset_rad=2.0 * DEG)
-    # told 0 (1500 us) the joint stood at +2 degrees; with sign -1 it takes longer pulses to come back
+    # commanded 0 (1500 us) the joint stood at +2 degrees; with sign -1 it takes longer pulses to come back
     assert better.pulse_us(0.0) == pytest.approx(1520.0, abs=1.0)
 
 
@@ -331,15 +333,15 @@ class WallHead:
 def test_the_whole_head_is_calibrated_by_what_it_sees():
     old = default_servos()
     head = WallHead(old, signs={"pan_right": -1, "tilt": -1}, zeros={"pan_left": 1.5 * DEG, "pan_right": -1.5 * DEG})
-    told: list[str] = []
+    commanded: list[str] = []
     cameras = {"left": CAMERA, "right": CAMERA}
-    fresh = calibrate_head(head, old, cameras, 1e-6, VisualParameters(far_m=1e3), told.append)
+    fresh = calibrate_head(head, old, cameras, 1e-6, VisualParameters(far_m=1e3), commanded.append)
     assert [fresh[name].sign for name in fresh] == [1, -1, -1]
     for name in fresh:
         assert abs(fresh[name].joint_rad(1600) - fresh[name].joint_rad(1500)) == pytest.approx(10 * DEG, rel=0.05)
         lost_rad = fresh[name].dead_band_rad + fresh[name].backlash_rad
         assert lost_rad == pytest.approx(SG90.dead_band_rad + SG90.backlash_rad, abs=0.25 * DEG)
-    # told 0, the eyes diverged by 3 degrees: each gets half of it back
+    # commanded 0, the eyes diverged by 3 degrees: each gets half of it back
     assert fresh["pan_left"].joint_rad(1500) == pytest.approx(1.5 * DEG, abs=0.7 * DEG)
     assert fresh["pan_right"].joint_rad(1500) == pytest.approx(-1.5 * DEG, abs=0.7 * DEG)
-    assert len(told) > 60
+    assert len(commanded) > 60
