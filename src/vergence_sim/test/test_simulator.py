@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from vergence_rig.geometry import gaze_for_point
-from vergence_rig.parameters import ParameterError
+from vergence_rig.parameters import ParameterError, renamed
 from vergence_rig.rig import default_rig
 from vergence_sim.head import CommandError
-from vergence_sim.parameters import SimParameters
+from vergence_sim.parameters import GROUPS, SimParameters
 from vergence_sim.renderer import RenderError
 from vergence_sim.simulator import Simulator, TargetError
 
@@ -244,3 +244,12 @@ def test_parameters_are_replaced_by_their_full_names():
         SimParameters.of({"world_seed": 4})
     with pytest.raises(ParameterError, match=r"'motion\.stations_m'"):
         SimParameters.of({"motion.stations_m": (1.0,)})
+
+
+def test_former_names_lead_to_the_groups():
+    former = {old: new for old, (new, _) in renamed(GROUPS).items()}
+    assert former["world_seed"] == "world.seed"
+    assert former["right_gain"] == "right_camera.gain"
+    assert former["target"] == "target.object"
+    assert former["motion"] == "motion.kind"
+    assert not former.keys() & {prefix + spec.name for prefix, group in GROUPS for spec in group.specs()}
