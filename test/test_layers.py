@@ -1,4 +1,4 @@
-"""Imports go downwards only: src knows nothing of training, training nothing of bench and tools, these not each other."""
+"""Imports go downwards only: from bench and tools to training, from these to src, and never between bench and tools."""
 
 import ast
 from pathlib import Path
