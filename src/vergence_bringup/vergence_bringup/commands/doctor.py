@@ -33,8 +33,8 @@ def run(options: argparse.Namespace) -> int:
     for finding in findings:
         mark = "ok  " if finding.ok else ("FAIL" if finding.needed else "note")
         print(f"{mark}  {finding.name}: {finding.message}")
-        if not finding.ok and finding.mend:
-            print(f"      -> {finding.mend}")
+        if not finding.ok and finding.remedy:
+            print(f"      -> {finding.remedy}")
     missing = sum(not finding.ok and finding.needed for finding in findings)
     print(f"\n{missing} required check{'s' * (missing != 1)} failed" if missing else "\nall required checks passed")
     return 1 if missing else 0
@@ -100,15 +100,15 @@ def _nodes() -> Iterable[Finding]:
 def _middleware() -> Iterable[Finding]:
     profile = os.environ.get("FASTRTPS_DEFAULT_PROFILES_FILE")
     shipped = config_dir() / "fastdds.xml"
-    mend = f"source env.sh, or export FASTRTPS_DEFAULT_PROFILES_FILE={shipped}"
+    remedy = f"source env.sh, or export FASTRTPS_DEFAULT_PROFILES_FILE={shipped}"
     if os.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp") != "rmw_fastrtps_cpp":
         name = os.environ["RMW_IMPLEMENTATION"]
         yield Finding("DDS", True, f"{name} is used: the shipped Fast DDS profile has no effect", needed=False)
     elif profile is None:
         message = "FASTRTPS_DEFAULT_PROFILES_FILE is not set: most raw image pairs will be lost or late"
-        yield Finding("DDS profile", False, message, mend)
+        yield Finding("DDS profile", False, message, remedy)
     elif not Path(profile).is_file():
-        yield Finding("DDS profile", False, f"no such file: {profile}", mend)
+        yield Finding("DDS profile", False, f"no such file: {profile}", remedy)
     else:
         yield Finding("DDS profile", True, profile)
     reach = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET (ROS's own default)")
@@ -120,8 +120,8 @@ def _shared_memory() -> Iterable[Finding]:
     usage = shutil.disk_usage("/dev/shm")
     free_mb = usage.free / 2**20
     message = f"/dev/shm has {free_mb:.0f} of {usage.total / 2**20:.0f} MiB free, {_SHM_NEEDED_MB} are needed"
-    mend = "mount -o remount,size=512M /dev/shm (in a container: --shm-size=512m)"
-    yield Finding("shared memory", free_mb >= _SHM_NEEDED_MB, message, mend)
+    remedy = "mount -o remount,size=512M /dev/shm (in a container: --shm-size=512m)"
+    yield Finding("shared memory", free_mb >= _SHM_NEEDED_MB, message, remedy)
 
 
 def _rendering(test: bool) -> Iterable[Finding]:
@@ -129,8 +129,8 @@ def _rendering(test: bool) -> Iterable[Finding]:
         yield Finding("simulator", False, "mujoco is not installed", "pip install mujoco (only sim_node needs it)")
         return
     library = ctypes.util.find_library("EGL")
-    mend = "apt install libegl1 libgl1-mesa-dri (only sim_node needs it)"
-    yield Finding("libEGL", library is not None, library or "not found", mend)
+    remedy = "apt install libegl1 libgl1-mesa-dri (only sim_node needs it)"
+    yield Finding("libEGL", library is not None, library or "not found", remedy)
     if not test or library is None:
         return
     code = "import mujoco; c = mujoco.GLContext(8, 8); c.make_current(); print(mujoco.__version__)"
@@ -138,7 +138,7 @@ def _rendering(test: bool) -> Iterable[Finding]:
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, timeout=60)
     lines = (result.stdout if result.returncode == 0 else result.stderr).strip().splitlines() or ["no output"]
     message = f"MuJoCo {lines[-1]} renders with MUJOCO_GL={env['MUJOCO_GL']}" if not result.returncode else lines[-1]
-    yield Finding("rendering", result.returncode == 0, message, mend)
+    yield Finding("rendering", result.returncode == 0, message, remedy)
 
 
 def _groups() -> Iterable[Finding]:

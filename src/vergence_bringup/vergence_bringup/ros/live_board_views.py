@@ -12,9 +12,9 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage, Image
+
 from vergence_camera.calibration.boards import BoardError, Detection
 from vergence_camera.calibration.views import EYES, View, ViewCollector
-
 from vergence_common.images import ImageError, compressed_to_array, image_to_array
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_seconds
