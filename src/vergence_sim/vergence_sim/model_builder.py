@@ -1,5 +1,7 @@
 """Writes a MuJoCo model: named textures and shapes in, a compiled model out."""
 
+import copy
+
 import cv2
 import mujoco
 import numpy as np
@@ -87,7 +89,10 @@ class ModelBuilder:
         <statistic extent="1" center="0 0 1"/>
         <asset>{"".join(self._assets) if self.textured else ""}</asset>
         <worldbody>{lights}{"".join(self._bodies)}</worldbody></mujoco>"""
-        return mujoco.MjModel.from_xml_string(xml, self._files)
+        model = mujoco.MjModel.from_xml_string(xml, self._files)
+        # The pictures stay in MuJoCo's cache and in the model's compiler, as large as the model each: drop both.
+        mujoco.mj_clearCache(mujoco.mj_getCache())
+        return copy.copy(model)
 
     def _file(self, name: str, image: Image) -> str:
         if self.textured:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from vergence_rig.rig import Rig, default_rig
 from vergence_sim.head import Head
+from vergence_sim.memory import return_free_memory
 from vergence_sim.motion import offset_m
 from vergence_sim.optics import Lens, Sensor, motion_blurred
 from vergence_sim.parameters import TARGETS, SimParameters
@@ -213,6 +214,7 @@ class Simulator:
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
+            return_free_memory()
 
     def _motion_px(self, eye: str) -> tuple[float, float]:
         rates = self.head.velocity_rad_s
