@@ -150,7 +150,7 @@ def test_live_views_are_accepted_when_the_board_is_still_and_somewhere_new(graph
             graph.wait_until(lambda: node._offered > seen[1], "the pair is looked at")
 
     show(20, 20)
-    assert collector.views == []  # a first look cannot tell whether it moves
+    assert collector.views == []  # one image cannot show whether it moves
     show(20, 20)
     assert len(collector.views) == 1
     show(20, 20)

@@ -113,13 +113,13 @@ class Graph:
         return future.result()
 
     def command(self, stamp_s: float | None = None, **positions_rad: float) -> None:
-        """Publish joint_command, stamped now unless told otherwise."""
+        """Publish joint_command, stamped now by default."""
         message = JointState(name=list(positions_rad), position=list(positions_rad.values()))
         message.header.stamp = to_stamp(time.time() if stamp_s is None else stamp_s)
         self.joint_command.publish(message)
 
     def duty_us(self, channel: int) -> float:
-        """The pulse that the kernel was told [us]; 0 if none."""
+        """The pulse in the kernel's file [us]; 0 if none."""
         texts = [(self.chip / f"pwm{channel}" / name).read_text().split() for name in ("duty_cycle", "enable")]
         return int(texts[0][0]) / 1000 if texts[0] and texts[1] == ["1"] else 0.0
 

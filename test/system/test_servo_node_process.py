@@ -28,7 +28,7 @@ def wait_for(condition: Callable[[], bool], what: str, patience_s: float = PATIE
 
 
 def attribute(path: Path) -> int:
-    """Read a number that somebody may just be writing: a file, unlike sysfs, is empty for that moment."""
+    """Read a number that may just be being written: a file, unlike sysfs, is empty for that moment."""
     while not (text := path.read_text().strip()):
         time.sleep(0.001)
     return int(text)

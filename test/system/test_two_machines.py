@@ -28,7 +28,7 @@ NEAR_US = 8.0
 
 
 def attribute(path: Path) -> int:
-    """Read a number that somebody may just be writing: a file, unlike sysfs, is empty for that moment."""
+    """Read a number that may just be being written: a file, unlike sysfs, is empty for that moment."""
     while not (text := path.read_text().strip()):
         time.sleep(0.001)
     return int(text)
@@ -73,7 +73,7 @@ class Machines:
         return self._run(self.cable.laptop, [*argv, "--params-file", str(CONFIG / "gaze_controller_node.yaml")])
 
     def target(self, place_m: tuple[float, float, float]) -> "subprocess.Popen[str]":
-        """Let somebody on the laptop tell the controller where to look."""
+        """Publish a gaze target on the laptop."""
         return self._script("gaze_target.py", *map(str, place_m))
 
     def commander(self, *arguments: str) -> "subprocess.Popen[str]":

@@ -21,7 +21,7 @@ TRUE_GAIN = {"pan_left": 0.1 * DEG, "pan_right": 0.085 * DEG, "tilt": 0.095 * DE
 
 
 class SimulatedHead:
-    """The simulator behind servos of which the calibration knows nothing: pulse to angle by their own sign and gain."""
+    """The simulator behind servos that are unknown to the calibration: pulse to angle by their own sign and gain."""
 
     def __init__(self) -> None:
         self.servos = default_servos()

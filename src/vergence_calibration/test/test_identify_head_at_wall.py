@@ -240,11 +240,11 @@ def ramp(time_s: float) -> np.ndarray:
     return 0.7 * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
 
 
-def pursuit_error_deg(believed: Rig, true_latency_s: float) -> float:
-    """Return how far the eyes are behind a target at 20 degrees/s, with a controller that believes this rig."""
+def pursuit_error_deg(rig: Rig, true_latency_s: float) -> float:
+    """Return how far the eyes are behind a target at 20 degrees/s, with a controller that uses this rig."""
     slow = replace(SG90, command_latency_s=true_latency_s, dead_band_rad=0.0, backlash_rad=0.0, pulse_step_rad=0.0)
     head = FakeHead(default_rig().with_servos(slow), ramp)
-    controller = GazeController(believed, gaze_parameters())
+    controller = GazeController(rig, gaze_parameters())
     arrived, errors, ticks = [], [], 0
     while head.time_s < 2.4:
         arrived += head.advance()
@@ -278,6 +278,6 @@ def test_the_file_is_read_back_and_the_controller_looks_further_ahead_with_it(tm
     assert document["axes"]["pan_left"]["left_eye"]["px_per_rad"] == pytest.approx(270, rel=0.03)
     assert document["command_to_arrival_s"] == pytest.approx(0.14, abs=0.015)
     assert nodes_text({"/servo_node": {"ros__parameters": {"command_latency_s": 0.1}}}).startswith("#")
-    before_deg, after_deg = (pursuit_error_deg(believed, 0.1) for believed in (load_rig(kept), again))
-    assert before_deg > 1.2  # 20 degrees/s for the 85 ms it does not know of
+    before_deg, after_deg = (pursuit_error_deg(rig, 0.1) for rig in (load_rig(kept), again))
+    assert before_deg > 1.2  # 20 degrees/s for the 85 ms of unmodelled latency
     assert after_deg < 0.5 * before_deg

@@ -1,4 +1,4 @@
-"""The demuxer's bytes are the file's bytes, whoever wrote the file, and a broken end is said."""
+"""The demuxer's bytes are the file's bytes, independent of the writer, and a truncated file is reported."""
 
 import io
 import struct

@@ -63,7 +63,7 @@ def test_different_rates_and_exposures(pair: Pair) -> None:
     assert not findings["pair2"].ok
     assert "gain 16 and 90" in findings["pair2"].message
     assert "Hz" in findings["pair2"].message
-    assert "hold" in findings["pair2"].mend
+    assert "hold" in findings["pair2"].remedy
 
 
 def test_a_shared_controller(machine: FakeMachine, make_jpeg: Callable[..., bytes]) -> None:

@@ -63,7 +63,7 @@ def test_the_servers_bytes_arrive_untouched(http_server: Serve, make_jpeg: Make,
         for number in range(5):
             to.part(make_jpeg(number), length=length)
             if not length:
-                to.send(b"--frame\r\n")  # only the next boundary tells where a picture without a length ends
+                to.send(b"--frame\r\n")  # only the next boundary ends a picture without a length
             to.turn()
         to.stall()
 

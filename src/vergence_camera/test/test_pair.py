@@ -1,4 +1,4 @@
-"""What is wrong with a pair, in words that mend it."""
+"""Faults of a pair of cameras, each with its remedy."""
 
 import math
 

@@ -1,1 +1,1 @@
-"""One USB webcam, file or network stream as a camera that a robot can live with. Only camera_node knows ROS."""
+"""USB webcams, recordings and network streams as one camera interface; only `ros/` imports ROS."""

@@ -122,11 +122,11 @@ def _check_pair(pair: Sequence[ListedDevice], trials: Sequence[_Trial], max_skew
     faults = faults_of_pair(eyes[0], eyes[1], meter.skew_s(), max_skew_s)
     name = f"pair {eyes[0].name}, {eyes[1].name}"
     if faults:
-        return Finding(name, False, "; ".join(fault.partition(": ")[0] for fault in faults), _mends(faults))
+        return Finding(name, False, "; ".join(fault.partition(": ")[0] for fault in faults), _remedies(faults))
     return Finding(name, True, f"{abs(meter.skew_s()) * 1e3:.1f} ms apart, own controllers, same rate and exposure")
 
 
-def _mends(faults: Sequence[str]) -> str:
+def _remedies(faults: Sequence[str]) -> str:
     return "; ".join(fault.partition(": ")[2] for fault in faults)
 
 

@@ -8,12 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence_rig import geometry as g
+from vergence_rig.testing.paper_geometry import paper_fixation
 
 BASELINE_M = 0.065
 
 
 def test_the_papers_80_80_degree_case() -> None:
-    found = g.paper_fixation(math.radians(80), math.radians(80), BASELINE_M)
+    found = paper_fixation(math.radians(80), math.radians(80), BASELINE_M)
     assert math.degrees(found.vergence_rad) == pytest.approx(20)
     assert found.om_m == pytest.approx(0.5 * BASELINE_M * math.tan(math.radians(80)))
     assert found.om_m == pytest.approx(0.184317, abs=1e-6)
@@ -31,7 +32,7 @@ def test_the_papers_angles_agree_with_pan_angles() -> None:
 @settings(deadline=None, max_examples=60)
 def test_paper_fixation_equals_3d_fixation_off_axis(x: float, y: float, baseline_m: float) -> None:
     eyes = g.gaze_for_point((x, y, 0.0), baseline_m)
-    found = g.paper_fixation(math.pi / 2 + eyes.pan_left_rad, math.pi / 2 - eyes.pan_right_rad, baseline_m)
+    found = paper_fixation(math.pi / 2 + eyes.pan_left_rad, math.pi / 2 - eyes.pan_right_rad, baseline_m)
     assert found.x_m == pytest.approx(x, rel=1e-6)
     assert found.y_m == pytest.approx(y, rel=1e-6, abs=1e-9)
     assert found.om_m == pytest.approx(math.hypot(x, y), rel=1e-6)
@@ -92,7 +93,7 @@ def test_parallel_and_diverging_axes_are_reported(vergence: float, error: type[E
     with pytest.raises(error):
         g.fixation_point(eyes, BASELINE_M)
     with pytest.raises(error):
-        g.paper_fixation(math.pi / 2 + eyes.pan_left_rad, math.pi / 2 - eyes.pan_right_rad, BASELINE_M)
+        paper_fixation(math.pi / 2 + eyes.pan_left_rad, math.pi / 2 - eyes.pan_right_rad, BASELINE_M)
     with pytest.raises(error):
         g.nearest_points_of_rays(
             g.eye_position(True, BASELINE_M),
@@ -126,4 +127,4 @@ def test_directions_without_angles(direction: tuple[float, float, float]) -> Non
 @pytest.mark.parametrize("angle", [0.0, -0.1, math.pi, math.nan])
 def test_paper_angles_out_of_range(angle: float) -> None:
     with pytest.raises(g.GeometryError):
-        g.paper_fixation(angle, 1.0, BASELINE_M)
+        paper_fixation(angle, 1.0, BASELINE_M)

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Writes files atomically."""
 
 import os
 import tempfile
@@ -6,10 +6,10 @@ from pathlib import Path
 
 
 def write_atomically(path: Path, text: str) -> None:
-    """Write a file so that a reader, or a power cut, meets the old one or the new one.
+    """Write a file so that a reader, or a power cut, finds either the old or the new content.
 
-    Its folder is made where it is missing. A file that is replaced keeps its permissions; a new one is readable by all.
-    Raises OSError, and then leaves nothing behind.
+    Its folder is created if missing. A replaced file keeps its permissions; a new one is readable by all.
+    Raises OSError, and then leaves no temporary file.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, partial = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)

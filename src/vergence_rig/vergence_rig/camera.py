@@ -22,14 +22,14 @@ _TOLERANCE = 1e-10
 
 
 class CameraModelError(ValueError):
-    """A camera description that cannot be: names the part, its value and what is allowed."""
+    """An invalid camera model: the message names the value, what it must be, and what was given."""
 
 
 class CameraModel:
     """Pixels to rays and back for one camera."""
 
     def __init__(self, spec: "CameraSpec") -> None:
-        """Take the camera of rig.yaml."""
+        """Build the model of a camera of rig.yaml."""
         self._set(
             spec.width_px,
             spec.height_px,
@@ -49,7 +49,7 @@ class CameraModel:
         """
         matrix = np.asarray(k, dtype=np.float64).reshape(-1)
         if matrix.shape != (9,):
-            raise CameraModelError(f"k has {matrix.size} values: allowed is 9, the row-major 3x3 intrinsic matrix")
+            raise CameraModelError(f"k must have 9 values, the row-major 3x3 intrinsic matrix: got {matrix.size}")
         model = cls.__new__(cls)
         model._set(width, height, (matrix[0], matrix[4], matrix[2], matrix[5]), d, distortion_model)
         return model
@@ -60,19 +60,17 @@ class CameraModel:
         self.width_px, self.height_px = int(width), int(height)
         self.fx_px, self.fy_px, self.cx_px, self.cy_px = (float(value) for value in intrinsics)
         if self.width_px <= 0 or self.height_px <= 0:
-            raise CameraModelError(f"image size is {width} x {height}: allowed is at least 1 x 1 [px]")
+            raise CameraModelError(f"image size must be at least 1 x 1 [px]: got {width} x {height}")
         if not (np.isfinite(intrinsics).all() and self.fx_px > 0 and self.fy_px > 0):
-            raise CameraModelError(
-                f"fx, fy, cx, cy are {tuple(intrinsics)}: allowed are finite values, fx and fy above 0 [px]"
-            )
+            raise CameraModelError(f"fx, fy, cx, cy must be finite, fx and fy above 0 [px]: got {tuple(intrinsics)}")
         if distortion_model not in _COEFFICIENTS:
             known = ", ".join(repr(name) for name in _COEFFICIENTS if name)
-            raise CameraModelError(f"distortion_model is {distortion_model!r}: allowed is one of {known}")
+            raise CameraModelError(f"distortion_model must be one of {known}: got {distortion_model!r}")
         coefficients = np.asarray(d, dtype=np.float64).reshape(-1)
         if coefficients.size not in _COEFFICIENTS[distortion_model] or not np.isfinite(coefficients).all():
             counts = " or ".join(str(count) for count in _COEFFICIENTS[distortion_model])
             raise CameraModelError(
-                f"distortion is {coefficients.tolist()}: allowed are {counts} finite values for '{distortion_model}'"
+                f"distortion must be {counts} finite values for '{distortion_model}': got {coefficients.tolist()}"
             )
         self.distortion_model = distortion_model or "plumb_bob"
         self.distortion = coefficients
@@ -80,7 +78,7 @@ class CameraModel:
         self._limit = _monotone_limit(coefficients) if self.distortion_model == "plumb_bob" else np.inf
 
     def undistort(self, uv: Any) -> Array:
-        """Return normalised coordinates (N, 2), x/z and y/z, of raw pixels (N, 2). NaN where nothing maps there."""
+        """Return normalised coordinates (N, 2), x/z and y/z, of raw pixels (N, 2); NaN where none exist."""
         pixels = np.atleast_2d(np.asarray(uv, dtype=np.float64))
         distorted = (pixels - (self.cx_px, self.cy_px)) / (self.fx_px, self.fy_px)
         if not self._is_distorted:
@@ -98,7 +96,7 @@ class CameraModel:
         return normalised
 
     def distort(self, normalised: Any) -> Array:
-        """Return raw pixels (N, 2) of normalised coordinates (N, 2). NaN where the lens model has turned back."""
+        """Return raw pixels (N, 2) of normalised coordinates (N, 2). NaN beyond the lens model's monotone range."""
         points = np.atleast_2d(np.asarray(normalised, dtype=np.float64))
         distorted = self._distort(points) if self._is_distorted else points
         pixels: Array = distorted * (self.fx_px, self.fy_px) + (self.cx_px, self.cy_px)
@@ -124,7 +122,7 @@ class CameraModel:
         return np.arctan(self.undistort(uv))
 
     def contains(self, uv: Any) -> npt.NDArray[np.bool_]:
-        """Tell which pixels (N, 2) lie in the image, to its outermost pixels' edges."""
+        """Return which pixels (N, 2) lie in the image, up to the edges of its outermost pixels."""
         pixels = np.atleast_2d(np.asarray(uv, dtype=np.float64))
         inside: npt.NDArray[np.bool_] = (
             (pixels >= -0.5).all(axis=1)
@@ -180,7 +178,7 @@ def _start_equidistant(distorted: Array) -> Array:
 
 
 def _monotone_limit(coefficients: Array) -> float:
-    """Radius up to which the radial polynomial still grows: beyond it, points fold back into the image."""
+    """Return the radius up to which the radial polynomial grows: beyond it, points fold back into the image."""
     if coefficients.size == 0 or not np.any(coefficients):
         return np.inf
     k1, k2, k3 = coefficients[0], coefficients[1], coefficients[4] if coefficients.size > 4 else 0.0

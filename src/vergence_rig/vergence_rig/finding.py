@@ -1,17 +1,17 @@
-"""What the parts of `vergence doctor` say, each of the machine it knows."""
+"""The result of one check of `vergence doctor`."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at: whether it is well, what was seen, and what mends it.
+    """One check: whether it passed, what was found, and the remedy.
 
-    `needed` says whether every use of the workspace needs it, or only some rigs.
+    `needed` is True if every use of the workspace needs it, False if only some rigs do.
     """
 
     name: str
     ok: bool
     message: str
-    mend: str = ""
+    remedy: str = ""
     needed: bool = True

@@ -1,4 +1,4 @@
-"""Where two eyes look, and where they have to look.
+"""From eye angles to the point of fixation, and back.
 
 `rig_base` has x forward, y left, z up; its origin lies midway between the eyes on the tilt axis, the left eye at
 +baseline/2 on y. The bar tilts first (about y, tilt > 0 looks down), then each eye pans (pan > 0 looks left): Helmholtz
@@ -18,7 +18,7 @@ _PARALLEL_RAD = 1e-7
 
 
 class GeometryError(ValueError):
-    """A geometry that has no answer."""
+    """A geometry without a solution."""
 
 
 class ParallelAxesError(GeometryError):
@@ -30,7 +30,7 @@ class DivergingAxesError(GeometryError):
 
 
 class UnreachableError(GeometryError):
-    """No pair of eye angles looks there."""
+    """No pair of eye angles reaches this direction or point."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class EyeAngles:
 
 @dataclass(frozen=True)
 class Fixation:
-    """Where two axes meet: the midpoint of their closest approach in rig_base (3,) [m] and how far they pass."""
+    """Where two axes meet: the midpoint of their closest approach in rig_base (3,) [m] and their distance there."""
 
     point_m: Array
     miss_distance_m: float
@@ -67,16 +67,6 @@ class Fixation:
     def distance_m(self) -> float:
         """From the midpoint between the eyes [m]."""
         return float(np.linalg.norm(self.point_m))
-
-
-@dataclass(frozen=True)
-class PaperFixation:
-    """The paper's planar fixation point: `om_m` from the baseline's middle M, `x_m` forward, `y_m` left [m]."""
-
-    om_m: float
-    x_m: float
-    y_m: float
-    vergence_rad: float
 
 
 def from_version_vergence(version_rad: float, vergence_rad: float, tilt_rad: float) -> EyeAngles:
@@ -124,7 +114,7 @@ def angles_of_direction(direction: Any) -> tuple[float, float]:
     x, y, z = (float(value) for value in direction)
     forward = math.hypot(x, z)
     if not (math.isfinite(forward) and math.isfinite(y)) or forward <= 1e-12 * abs(y) or forward == 0.0:
-        raise UnreachableError(f"direction is ({x:g}, {y:g}, {z:g}): allowed is one that is not along the baseline")
+        raise UnreachableError(f"direction must be finite and not along the baseline: got ({x:g}, {y:g}, {z:g})")
     return math.atan2(y, forward), math.atan2(-z, x)
 
 
@@ -136,7 +126,7 @@ def gaze_for_point(point_m: Any, baseline_m: float) -> EyeAngles:
     x, y, z = (float(value) for value in point_m)
     forward = math.hypot(x, z)
     if not (math.isfinite(forward) and math.isfinite(y)) or forward <= 1e-9:
-        raise UnreachableError(f"point is ({x:g}, {y:g}, {z:g}) m: allowed is a finite point off the baseline's line")
+        raise UnreachableError(f"point must be finite and off the baseline's line: got ({x:g}, {y:g}, {z:g}) m")
     half = 0.5 * baseline_m
     return EyeAngles(math.atan2(y - half, forward), math.atan2(y + half, forward), math.atan2(-z, x))
 
@@ -148,10 +138,10 @@ def point_at(version_rad: float, vergence_rad: float, tilt_rad: float, baseline_
     """
     pan_left = version_rad - 0.5 * vergence_rad
     pan_right = version_rad + 0.5 * vergence_rad
-    _check_converging(vergence_rad)
+    check_converging(vergence_rad)
     cos_left, cos_right = math.cos(pan_left), math.cos(pan_right)
     if cos_left <= 0 or cos_right <= 0:
-        raise DivergingAxesError(f"pans are {pan_left:g} and {pan_right:g} rad: allowed is less than a quarter turn")
+        raise DivergingAxesError(f"pans must be within a quarter turn: got {pan_left:g} and {pan_right:g} rad")
     # forward * tan(pan_right) - forward * tan(pan_left) = baseline, with the difference of tangents as a product
     forward = baseline_m * cos_left * cos_right / math.sin(vergence_rad)
     lateral = forward * math.tan(pan_left) + 0.5 * baseline_m
@@ -167,7 +157,7 @@ def fixation_point(eye_angles: EyeAngles, baseline_m: float) -> Fixation:
 def nearest_points_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direction_b: Any) -> tuple[Array, Array]:
     """Return the points (3,), (3,) of two rays that are closest to each other.
 
-    Real mounts are never square, so real gaze rays pass each other. Origins (3,) [m], directions (3,), any length.
+    Real mounts are never square, so real gaze rays do not intersect. Origins (3,) [m], directions (3,), any length.
     Raises ParallelAxesError, or DivergingAxesError where the closest approach lies behind either origin.
     """
     a, b = np.asarray(origin_a, dtype=np.float64), np.asarray(origin_b, dtype=np.float64)
@@ -186,30 +176,15 @@ def nearest_points_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direc
 
 
 def fixation_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direction_b: Any) -> Fixation:
-    """Return the midpoint of the closest approach of two rays, and their miss distance; raises as the above."""
+    """Return the midpoint of the closest approach of two rays, and their distance. Raises as `nearest_points_of_rays`."""
     nearest_a, nearest_b = nearest_points_of_rays(origin_a, direction_a, origin_b, direction_b)
     return Fixation(0.5 * (nearest_a + nearest_b), float(np.linalg.norm(nearest_b - nearest_a)))
 
 
-def paper_fixation(c1_rad: float, c2_rad: float, baseline_m: float) -> PaperFixation:
-    """Return the fixation point from the paper's baseline angles [rad].
-
-    C1 and C2 are the interior angles of the triangle of both eyes and the fixation point: C1 = 90 deg + pan_left,
-    C2 = 90 deg - pan_right. At equal angles OM = d/2 tan C. Raises ParallelAxesError or DivergingAxesError.
-    """
-    for name, angle in (("c1_rad", c1_rad), ("c2_rad", c2_rad)):
-        if not 0.0 < angle < math.pi:
-            raise GeometryError(f"{name} is {angle!r}: allowed is an angle between 0 and pi [rad]")
-    vergence_rad = math.pi - c1_rad - c2_rad
-    _check_converging(vergence_rad)
-    forward = baseline_m * math.sin(c1_rad) * math.sin(c2_rad) / math.sin(c1_rad + c2_rad)
-    lateral = 0.5 * baseline_m - forward * math.cos(c1_rad) / math.sin(c1_rad)
-    return PaperFixation(math.hypot(forward, lateral), forward, lateral, vergence_rad)
-
-
-def _check_converging(vergence_rad: float) -> None:
+def check_converging(vergence_rad: float) -> None:
+    """Raise ParallelAxesError or DivergingAxesError unless the axes of this vergence [rad] converge."""
     if not math.isfinite(vergence_rad):
-        raise GeometryError(f"vergence is {vergence_rad!r}: allowed is a finite angle [rad]")
+        raise GeometryError(f"vergence must be a finite angle [rad]: got {vergence_rad!r}")
     if abs(vergence_rad) < _PARALLEL_RAD:
         raise ParallelAxesError(f"vergence is {vergence_rad:.1e} rad: the axes are parallel and meet at infinity")
     if vergence_rad < 0:

@@ -71,7 +71,7 @@ class UnknownParameterError(ParameterError):
 
 @dataclass(frozen=True)
 class ParameterSpec:
-    """What is known of one parameter beside its value.
+    """Everything about one parameter but its value.
 
     `kind` is bool, int, float or str, `is_list` says that the value is a tuple of them. `minimum` and `maximum` are
     inclusive and hold for every element of a list; `choices` lists the allowed strings. `formerly` is the
@@ -97,7 +97,7 @@ class ParameterSpec:
 
     @property
     def allowed(self) -> str:
-        """What is allowed, in words."""
+        """What the value must be, in words."""
         noun = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}[self.kind]
         if self.choices is not None:
             noun = "one of " + ", ".join(repr(choice) for choice in self.choices)
@@ -180,7 +180,7 @@ class Parameters:
         self.check()
 
     def check(self) -> None:
-        """Raise ParameterError where two parameters do not fit together; the base has nothing to check."""
+        """Raise ParameterError where parameters contradict each other; the base checks nothing."""
 
     @classmethod
     def specs(cls) -> tuple[ParameterSpec, ...]:

@@ -1,6 +1,6 @@
 """The rig: baseline, cameras, joints and limits, as rig.yaml describes them.
 
-Every part is a frozen dataclass that validates itself; errors name the key, the value and what is allowed.
+Every part is a frozen dataclass that validates itself; errors name the key, what it must be, and the value.
 """
 
 import math
@@ -21,7 +21,7 @@ _DEG = math.pi / 180.0
 
 
 class RigError(ValueError):
-    """A rig description that cannot be: names the key, the value and what is allowed."""
+    """An invalid rig description: the message names the key, what it must be, and the value."""
 
 
 @dataclass(frozen=True)
@@ -34,17 +34,19 @@ class CameraSpec(Parameters):
     fy_px: float = parameter(539.0, "focal length along y", unit="px", minimum=1, maximum=1e5)
     cx_px: float = parameter(319.5, "principal point, x", unit="px", minimum=-1e5, maximum=1e5)
     cy_px: float = parameter(239.5, "principal point, y", unit="px", minimum=-1e5, maximum=1e5)
-    distortion: tuple[float, ...] = parameter((0.0, 0.0, 0.0, 0.0, 0.0), "k1 k2 p1 p2 k3", minimum=-100, maximum=100)
+    distortion: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0), "plumb_bob distortion coefficients k1 k2 p1 p2 k3", minimum=-100, maximum=100
+    )
 
     def check(self) -> None:
-        """Hold the number of coefficients to five."""
+        """See Parameters."""
         if len(self.distortion) != 5:
             raise ParameterError("distortion", self.distortion, "a list of five numbers: k1 k2 p1 p2 k3")
 
 
 @dataclass(frozen=True)
 class JointSpec:
-    """One joint: where it may go, how fast it may be commanded, and the servo that turns it."""
+    """One joint: its limits, the largest commanded speed, and its servo."""
 
     lower_rad: float
     upper_rad: float
@@ -154,7 +156,7 @@ def default_rig() -> Rig:
 
 
 def load_rig(path: str | Path) -> Rig:
-    """Read a rig from YAML; "" gives the built-in one. Raises RigError naming file, key, value and what is allowed."""
+    """Read a rig from YAML; "" gives the built-in one. Raises RigError."""
     if str(path) == "":
         return default_rig()
     try:
@@ -172,7 +174,7 @@ def load_rig(path: str | Path) -> Rig:
 def rig_from_mapping(document: Any) -> Rig:
     """Build a rig from nested mappings as in rig.yaml; what is left out keeps its default. Raises RigError.
 
-    The key `identified` is the record that `vergence identify` leaves; nothing here depends on it.
+    The key `identified` is the record written by `vergence identify`; it is ignored here.
     """
     keys = ("baseline_m", "left_camera", "right_camera", "joints", "minimum_vergence_rad", "identified")
     top = _mapping("rig", document, keys)

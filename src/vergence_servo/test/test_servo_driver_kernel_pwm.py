@@ -131,7 +131,7 @@ def test_kernel_pwm_names_the_device_tree_line_and_the_group(tmp_path: Path, mon
     chip = tmp_path / "pwmchip0"
     (chip / "pwm0").mkdir(parents=True)
     (chip / "npwm").write_text("2\n")
-    (chip / "pwm0" / "duty_cycle").mkdir()  # nobody, not even root, can write to it
+    (chip / "pwm0" / "duty_cycle").mkdir()  # not even root can write to it
     with pytest.raises(DriverIoError):
         KernelPwmDriver(KernelPwmParameters(root=str(tmp_path))).set_pulse_us(0, 1500.0)
 

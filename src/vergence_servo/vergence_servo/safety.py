@@ -59,7 +59,7 @@ def safe_pulse_us(
 def credit_s(elapsed_s: float, limits: ServoLimits, resolution_us: float, speed_rad_s: float) -> float:
     """Return the time [s] for which the servo may move now: never more than has passed, nor than a pulse period.
 
-    A servo whose slew limit makes one step of the grid take longer than a pulse period may save up for that step.
+    A servo that needs more than a pulse period for one step of the grid, by its slew limit, may accumulate time for it.
     """
     if not elapsed_s > 0 or speed_rad_s <= 0:
         return 0.0

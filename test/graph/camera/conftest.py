@@ -1,4 +1,4 @@
-"""What the camera node's graph tests share: a machine of fake webcams, and frames that arrive when told."""
+"""What the camera node's graph tests share: a machine of fake webcams, and frames that arrive on demand."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -57,7 +57,7 @@ class Listener:
         self.messages: list[Any] = []
         self._graph = graph
         self._subscription = graph.client.create_subscription(kind, topic, self.messages.append, IMAGE_QOS)
-        graph.wait_until(lambda: graph.client.count_publishers(topic) > 0, f"somebody publishes {topic}")
+        graph.wait_until(lambda: graph.client.count_publishers(topic) > 0, f"a publisher of {topic}")
 
     def wait_for(self, count: int) -> list[Any]:
         self._graph.wait_until(lambda: len(self.messages) >= count, f"{count} messages")

@@ -44,7 +44,7 @@ class FakeCamera:
         self.changed = threading.Condition()
 
     def push(self, data: bytes, time_ns: int | None = None, *, damaged: bool = False) -> bool:
-        """Let one frame arrive; False if nobody streams or no buffer is free (it is lost, but counted)."""
+        """Deliver one frame; False if the stream is off or no buffer is free (the frame is dropped, but counted)."""
         with self.changed:
             sequence, self.sequence = self.sequence, self.sequence + 1
             if not self.streamer or not self.queued:

@@ -20,7 +20,7 @@ class FakeKernel:
 
     @property
     def open_descriptors(self) -> list[int]:
-        """Descriptors that nobody has closed yet."""
+        """Descriptors that are open."""
         return sorted(self._open)
 
     def open(self, path: str) -> int:

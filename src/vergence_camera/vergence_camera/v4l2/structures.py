@@ -195,7 +195,7 @@ class Buffer(Structure):
 
 
 class BufferType(Structure):
-    """The int that STREAMON and STREAMOFF take."""
+    """The int argument of STREAMON and STREAMOFF."""
 
     _fields_ = (("value", c_int32),)
 
@@ -227,7 +227,7 @@ class QueryExtControl(Structure):
 
 
 class QueryControl(Structure):
-    """struct v4l2_queryctrl, for drivers that know no extended query."""
+    """struct v4l2_queryctrl, for drivers without the extended query."""
 
     _fields_ = (
         ("id", c_uint32),

@@ -41,7 +41,7 @@ class KernelPwmDriver:
     """Pulses from the chip's channels, set in nanoseconds."""
 
     outlives_process = True
-    # sysfs takes nanoseconds; the hardware counts its 100 MHz (Pi 4) or 50 MHz (Pi 5) clock.
+    # sysfs counts nanoseconds; the hardware counts its 100 MHz (Pi 4) or 50 MHz (Pi 5) clock.
     resolution_us = 0.02
 
     def __init__(self, parameters: KernelPwmParameters | None = None) -> None:
