@@ -78,7 +78,7 @@ source_sum() {
   {
     find src \( -name package.xml -o -name 'setup.*' -o -name CMakeLists.txt -o -name '*.msg' -o -name '*.srv' \
       -o -name '*.action' \) -type f -print0 | sort -z | xargs -0 sha256sum
-    find src config -path '*/__pycache__' -prune -o -path '*.egg-info' -prune -o -type f -print | sort
+    find src -path '*/__pycache__' -prune -o -path '*.egg-info' -prune -o -type f -print | sort
     echo "$root $("$venv/bin/python" --version)"
   } | sha256sum
 }
