@@ -1,10 +1,10 @@
-"""How well `vergence identify` finds what the simulator was commanded: the table of docs/identify.md.
+"""The accuracy of `vergence identify` against the simulator: the table of docs/identify.md.
 
     python tools/identify_study.py            every row, some minutes
     python tools/identify_study.py 1          only the first
 
-Runs in lockstep: the simulator's own events in order of their times, no clock, no ROS. What a busy machine and the
-way of a message add is therefore not in it.
+Runs in lockstep: the simulator's own events in order of their times, no clock, no ROS. Delays of a busy machine
+and of messages are therefore not included.
 """
 
 import math
@@ -27,7 +27,7 @@ from vergence_sim.simulator import Simulator
 
 @dataclass(frozen=True)
 class Case:
-    """What the simulator is commanded."""
+    """One setting of the simulator."""
 
     name: str
     parameters: SimParameters
@@ -45,7 +45,7 @@ CASES = [
 
 
 class LockstepHead:
-    """The simulated head, whose time is that of its own events."""
+    """The simulated head, in the time of its own events."""
 
     def __init__(self, case: Case) -> None:
         self.simulator = Simulator(case.parameters)
@@ -116,7 +116,7 @@ def row(case: Case) -> str:
         if timing.speed_known
     ]
     head.simulator.close()
-    speed = f"{100 * _worst(speeds):+.0f} % ({len(speeds)} of 4 commanded)" if speeds else "none commanded"
+    speed = f"{100 * _worst(speeds):+.0f} % ({len(speeds)} of 4 measured)" if speeds else "not measured"
     return (
         f"| {case.name} | {1e3 * _worst([error for error, _ in errors]):+.1f} ms "
         f"({_worst([e / s for e, s in errors]):+.1f} sigma) | {1e3 * _worst(late):+.1f} ms | "

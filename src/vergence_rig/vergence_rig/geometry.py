@@ -176,7 +176,7 @@ def nearest_points_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direc
 
 
 def fixation_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direction_b: Any) -> Fixation:
-    """Return the midpoint of the closest approach of two rays, and their distance. Raises as `nearest_points_of_rays`."""
+    """Return the midpoint of closest approach of two rays and their distance. Raises as `nearest_points_of_rays`."""
     nearest_a, nearest_b = nearest_points_of_rays(origin_a, direction_a, origin_b, direction_b)
     return Fixation(0.5 * (nearest_a + nearest_b), float(np.linalg.norm(nearest_b - nearest_a)))
 
