@@ -242,8 +242,7 @@ def _loop(head: FakeHead, controller: GazeController, scenario: Scenario) -> Tra
         command = controller.step(now_s, arrived)
         took_s = time.perf_counter() - began
         arrived = []
-        if command.joints_rad is not None:
-            head.command(command.joints_rad)
+        head.execute(command)
         report = command.report
         position = report.target
         samples.append(

@@ -19,7 +19,7 @@ from std_msgs.msg import Header
 from vergence_common.stamps import to_stamp
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import JointReport, Observation
-from vergence_gaze.goals.goal import Goal, GoalKind
+from vergence_gaze.goals.goal import Goal, GoalKind, TrackRequest
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.ros import gaze_messages
@@ -27,7 +27,7 @@ from vergence_metric.disparity.angular_disparity import angular_disparity
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.ros.edge_messages import edge_message, error_message
-from vergence_metric.ros.track_messages import track_message
+from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_rig.camera import CameraModel
 from vergence_rig.joint_history import JointHistory
 from vergence_rig.rig import JOINT_NAMES, Rig
@@ -84,6 +84,10 @@ class MetricOfPairs:
     def on_joints(self, stamp_s: float, angles_rad: Mapping[str, float]) -> None:
         """Keep a joint report."""
         self._joints.add(_ns(stamp_s), list(angles_rad), list(angles_rad.values()))
+
+    def on_request(self, request: TrackRequest) -> None:
+        """Pass the controller's request on to the tracker; it takes effect at the next pair, as in the node."""
+        self._measurement.request_track(track_request(gaze_messages.track_request(request, *self._models)))
 
     def observe(self, left: Image, right: Image, left_stamp_s: float, right_stamp_s: float) -> list[Observation]:
         """Measure a pair and return what the controller receives of it."""
@@ -187,6 +191,8 @@ class Lockstep:
             arrived += seen
             self.newest_exposure_s = max(self.newest_exposure_s, exposed_s)
         command = self.controller.step(_clock_s(now_s), arrived)
+        if command.track_request is not None:
+            self.metric.on_request(command.track_request)
         if command.joints_rad is not None:
             self.world.command(dict(zip(JOINT_NAMES, command.joints_rad.tolist(), strict=True)), now_s)
         self.on_step(command)

@@ -30,8 +30,7 @@ for tick in range(900):
         if tick == 120:
             controller.look_at(Goal(GoalKind.POINT, point_m=(0.8, 0.1, 0.05)), head.time_s)
         command, seen = controller.step(head.time_s, seen), []
-        if command.joints_rad is not None:
-            head.command(command.joints_rad)
+        head.execute(command)
 assert command.report.law == "proportional" and np.abs(head.true_errors_rad()).max() < 0.005
 """,
     "A disparity estimator": """

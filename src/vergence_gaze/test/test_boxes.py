@@ -54,8 +54,8 @@ class Run:
                 continue
             command = self.controller.step(self.head.time_s, [*arrived, *extra(self.head.time_s)])
             arrived = []
+            self.head.execute(command)
             if command.joints_rad is not None:
-                self.head.command(command.joints_rad)
                 self.commands.append(command.joints_rad)
             self.report = command.report
             self.outcomes += command.outcomes
@@ -122,7 +122,7 @@ def test_boxes_of_something_else_change_nothing() -> None:
 
 
 def test_boxes_say_that_the_tracker_follows_another_object() -> None:
-    seeing = replace(DETECTOR, track=True, extent_rad=0.02)
+    seeing = replace(DETECTOR, track=True, extent_rad=0.02, answers_requests=False)
     run = Run(seeing, {"track": lambda time_s: BEHIND if time_s > 1.0 else None})
     run.click()
     run.until(4.0)
@@ -130,7 +130,7 @@ def test_boxes_say_that_the_tracker_follows_another_object() -> None:
 
 
 def test_three_that_disagree_hold_the_eyes_still() -> None:
-    seeing = replace(DETECTOR, track=True, extent_rad=0.02)
+    seeing = replace(DETECTOR, track=True, extent_rad=0.02, answers_requests=False)
     wrong = {
         "track": lambda time_s: BEHIND if time_s > 1.0 else None,
         "fovea": lambda time_s: 0.55 * PLACE if time_s > 1.0 else None,

@@ -44,8 +44,7 @@ class Run:
                 continue
             command = self.controller.step(self.head.time_s, [*self._arrived, *extra(self.head.time_s)])
             self._arrived = []
-            if command.joints_rad is not None:
-                self.head.command(command.joints_rad)
+            self.head.execute(command)
             self.report = command.report
             self.outcomes += command.outcomes
             self.phases.append(command.report.phase)
@@ -250,7 +249,8 @@ def test_estimators_that_disagree_hold_the_eyes_still() -> None:
     unattainable = gaze_parameters(
         {"verged.contrast_enter": 0.01}
     )  # so that the goal is still active when they begin to differ
-    run = Run(rig_with(IDEAL), fixed(0.7, 0.05, 0.0), unattainable)
+    vision = VisionModel(answers_requests=False)
+    run = Run(rig_with(IDEAL), fixed(0.7, 0.05, 0.0), unattainable, vision=vision)
     run.click()
     run.until(1.0)
     original = run.head._send

@@ -46,8 +46,7 @@ def errors_deg(
             controller.look_at(Goal(GoalKind.CLASS, class_name="target", time_limit_s=60.0), head.time_s)
         command = controller.step(head.time_s, arrived)
         arrived = []
-        if command.joints_rad is not None:
-            head.command(command.joints_rad)
+        head.execute(command)
         outcomes += command.outcomes
         errors.append(np.degrees(head.true_errors_rad()))
     return np.array(errors), outcomes
@@ -138,15 +137,16 @@ def test_the_servo_inverse_lands_the_shaft_and_then_rests(direction: float) -> N
     half_play = np.full(3, 0.009)
     servo = ServoSpec(dead_band_rad=0.012, backlash_rad=0.006)
     inverse = ServoInverse(default_rig().with_servos(servo), ServoParameters(hold_tolerance_rad=0.0008))
+    half_play = np.full(3, 0.5 * (servo.dead_band_rad + servo.backlash_rad))
     shaft, command = np.zeros(3), np.zeros(3)
     wanted = np.full(3, direction * 0.2)
     for _ in range(5):
-        command = inverse.command(wanted, shaft, command)
+        command = inverse.command(wanted, shaft, command, half_play)
         shaft = np.clip(shaft, command - half_play, command + half_play)
     np.testing.assert_allclose(shaft, wanted, atol=1e-12)
     # going on the same way is exact, a small way back is left alone, a larger one crosses most of the play
-    further = inverse.command(wanted + direction * 0.01, shaft, command)
+    further = inverse.command(wanted + direction * 0.01, shaft, command, half_play)
     np.testing.assert_allclose(further - command, direction * 0.01, atol=1e-12)
-    np.testing.assert_array_equal(inverse.command(wanted - direction * 0.003, shaft, command), command)
-    back = inverse.command(wanted - direction * 0.01, shaft, command)
+    np.testing.assert_array_equal(inverse.command(wanted - direction * 0.003, shaft, command, half_play), command)
+    back = inverse.command(wanted - direction * 0.01, shaft, command, half_play)
     np.testing.assert_allclose(back, wanted - direction * (0.01 + 0.85 * 0.009), atol=1e-12)

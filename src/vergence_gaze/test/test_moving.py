@@ -64,8 +64,7 @@ class Trial:
                 controller.look_at(goal, head.time_s)
             command = controller.step(head.time_s, arrived)
             arrived = []
-            if command.joints_rad is not None:
-                head.command(command.joints_rad)
+            head.execute(command)
             error_deg = float(np.abs(np.degrees(head.true_errors_rad())).max())
             samples.append((head.time_s, error_deg, command.report.phase, command.report.verged))
         self.time_s = np.array([sample[0] for sample in samples])
@@ -187,7 +186,8 @@ def test_a_track_that_slips_is_put_right_by_the_boxes(target: Place) -> None:
         slip = math.tan(math.radians(0.7 if time_s > 2.5 else 0.0))
         return replace(observation, track_id=1, lock_stamp_s=0.1, left_x=observation.left_x + slip)
 
-    trial = Trial(target, LOADED, until_s=7.0, click=True, arriving=slipping)
+    vision = replace(LOADED, answers_requests=False)
+    trial = Trial(target, vision, until_s=7.0, click=True, arriving=slipping)
     assert np.median(trial.error_deg[trial.time_s > 4.5]) < 0.35
     assert trial.verged[trial.time_s > 4.5].mean() > 0.8
 
@@ -205,7 +205,8 @@ def test_what_only_the_fovea_still_sees_is_not_called_verged_for_long(seen: bool
         hidden = isinstance(observation, TrackSighting | BoxSighting) and time_s > 2.0 and not seen
         return None if hidden else observation
 
-    trial = Trial(lambda time_s: to_and_fro(0.0), LOADED, until_s=4.0, click=True, arriving=hiding)
+    vision = replace(LOADED, answers_requests=False)
+    trial = Trial(lambda time_s: to_and_fro(0.0), vision, until_s=4.0, click=True, arriving=hiding)
     assert trial.verged[(trial.time_s > 1.5) & (trial.time_s < 2.5)].all()
     assert trial.verged[trial.time_s > 3.5].any() == seen
     assert seen or "the target was not seen for long" in trial.reason

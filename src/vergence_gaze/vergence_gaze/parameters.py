@@ -104,6 +104,13 @@ class ServoParameters(Parameters):
         maximum=1,
         formerly="dead_band_trust",
     )
+    play_learning: float = parameter(
+        0.7,
+        "share of a difference between the described and the observed play of a joint that is learnt at its next "
+        "reversal; 0 keeps the description",
+        minimum=0,
+        maximum=1,
+    )
 
 
 @dataclass(frozen=True)

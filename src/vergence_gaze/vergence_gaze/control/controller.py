@@ -13,7 +13,7 @@ from vergence_gaze.control.search_pattern import Searcher
 from vergence_gaze.estimation.directions import spread_of_eye
 from vergence_gaze.estimation.observations import JointResolution, Observation, PointSighting
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
-from vergence_gaze.goals.goal import Goal, GoalError, Result
+from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
 from vergence_gaze.goals.goal_resolution import RequestedClass, RequestedPose, resolve_goal
 from vergence_gaze.joints.frames import point_in_rig
@@ -44,6 +44,7 @@ class GazeController:
         self._limits = CommandLimits(rig)
         self._goals = GoalMonitor()
         self._enabled = True
+        self._track_request: TrackRequest | None = None
         self._pose: Array | None = None
         self._rest = _UNKNOWN
         self._command: Array | None = None
@@ -110,13 +111,20 @@ class GazeController:
         self._perception.judge.restart()
         self._law.reset()
         self._searcher.stop()
+        self._track_request = TrackRequest(0)
         if isinstance(request, RequestedPose):
             self._perception.tracking.clear()
             self._pose = np.where(self._driven, request.joints_rad, np.nan)
         elif isinstance(request, RequestedClass):
             self._perception.tracking.request_class(now_s, request.class_name)
         else:
-            self._perception.tracking.request_target(now_s, request.stamp_s, request.angles_rad, request.covariance)
+            seen = goal.kind in (GoalKind.PIXEL, GoalKind.STEREO_PIXEL)
+            if seen:
+                xy = goal.left_xy if goal.left_eye else goal.right_xy
+                self._track_request = TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy)
+            self._perception.tracking.request_target(
+                now_s, request.stamp_s, request.angles_rad, request.covariance, goal_id if seen else 0
+            )
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
 
@@ -143,6 +151,7 @@ class GazeController:
         elif not self._active:
             self._active = self._verges_on_sight = True
             self._perception.tracking.clear()
+            self._track_request = TrackRequest(0)
 
     def step(self, now_s: float, observations: Iterable[Observation] = ()) -> Command:
         """Update by what arrived since the last cycle and return what to command now.
@@ -170,7 +179,8 @@ class GazeController:
         if sending:
             self._perception.history.on_command(now_s)
         self._update_goal(now_s)
-        return Command(sent if sending else None, self._report(now_s), self._goals.pop_outcomes())
+        request, self._track_request = self._track_request, None
+        return Command(sent if sending else None, self._report(now_s), self._goals.pop_outcomes(), request)
 
     def _observe(self, observation: Observation, now_s: float) -> None:
         if isinstance(observation, JointResolution):
@@ -192,6 +202,7 @@ class GazeController:
     def _follow_stream(self, now_s: float) -> None:
         if not self._perception.tracking.follows_stream:
             self._perception.tracking.request_stream(now_s)
+            self._track_request = TrackRequest(0)
             self._perception.judge.restart("the target is a stream of points")
             self._active, self._pose, self._verges_on_sight = True, None, False
 
@@ -238,6 +249,7 @@ class GazeController:
             driven=self._driven,
             speed_rad_s=self._limits.speed_rad_s,
             lead_s=self._lead_s,
+            half_play_rad=self._perception.history.half_play_rad,
         )
 
     def _situation(self, state: ControlInput) -> Situation:

@@ -59,6 +59,7 @@ class Perception:
     def configure(self, parameters: GazeParameters, driven: Driven) -> None:
         """Start again with other parameters; `driven` (3,) says which joints may move."""
         self._p, self._driven = parameters, driven
+        self.history.play.learning_share = parameters.servo.play_learning
         self._moves = JointMoves(self._rig, self.history)
         self.tracking = TargetTracking(self._rig, parameters, self.history, self._moves)
         self.judge = VergenceJudge(parameters.verged)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from vergence_gaze.control.perception import Perception
 from vergence_gaze.estimation.distance import TargetPosition
 from vergence_gaze.estimation.target_filter import TargetEstimate
-from vergence_gaze.goals.goal import Outcome
+from vergence_gaze.goals.goal import Outcome, TrackRequest
 from vergence_gaze.phases import Phase, PhaseMachine
 from vergence_rig.geometry import GeometryError, eye_direction, eye_position, fixation_of_rays
 from vergence_rig.rig import Rig
@@ -44,11 +44,16 @@ class GazeReport:
 
 @dataclass(frozen=True)
 class Command:
-    """One cycle's result: joint angles (3,) to send, or None; the report; and the goals that ended."""
+    """One cycle's result.
+
+    Joint angles (3,) to send, or None; the report; the goals that ended; and what the tracker is to follow from now on,
+    None for no change.
+    """
 
     joints_rad: Array | None
     report: GazeReport
     outcomes: tuple[Outcome, ...]
+    track_request: TrackRequest | None = None
 
 
 def make_report(

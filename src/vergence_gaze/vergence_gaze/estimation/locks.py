@@ -64,6 +64,13 @@ class TrackLock:
         self.track_id = track_id
         return ""
 
+    def adopt_requested(self, track_id: int, is_answer: bool) -> str:
+        """Adopt the track that answers the request for the target; returns why not, or ""."""
+        if not is_answer:
+            return "the tracker has not found the requested target yet"
+        self.track_id, self.offset = track_id, np.zeros(2)
+        return ""
+
     def add(self, stamp_s: float, track_id: int, seen_rad: Array) -> None:
         """Keep where a track was, at `seen_rad` (left pan, right pan, tilt), to compare with slower boxes."""
         self._seen.append((stamp_s, track_id, seen_rad))

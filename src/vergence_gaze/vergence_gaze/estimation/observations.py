@@ -56,6 +56,7 @@ class TrackSighting:
     extent_rad: float
     usable: bool
     reason: str = ""
+    goal_id: int = 0
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ Array = npt.NDArray[np.float64]
 _FRESH_S = 0.15
 _BOX_LATE_S = 0.4
 _CLASS_CONFIRMED_S = 1.0
+_RESTED_S = 0.05  # an image shows where a move ended once the joints have rested this long
 
 
 class TargetTracking(TargetEstimator):
@@ -57,10 +58,20 @@ class TargetTracking(TargetEstimator):
         self._distractors.clear()
         self._requested_s = self._class_seen_s = -math.inf
         self._fovea_was_inconsistent = False
+        self._goal_id = 0
+        self._tracker_answers = False
+        self._history.play.restart()
 
-    def request_target(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
-        """Start with a target at version, vergence, tilt (3,) with this covariance (3, 3), as seen at `stamp_s`."""
+    def request_target(
+        self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array, goal_id: int = 0
+    ) -> None:
+        """Start with a target at version, vergence, tilt (3,) with this covariance (3, 3), as seen at `stamp_s`.
+
+        With a `goal_id` the tracker was asked for it: as soon as it answers, only its track for that goal is the
+        target, and nothing else that lies near the fovea.
+        """
         self.clear()
+        self._goal_id = goal_id
         self.filter.initialise(stamp_s, angles_rad, covariance)
         self._requested_s = now_s
         self.seen_s = now_s
@@ -89,6 +100,7 @@ class TargetTracking(TargetEstimator):
 
     def update_track(self, sighting: TrackSighting, now_s: float) -> bool:
         """Update by a track; returns True if it was the target's and was accepted."""
+        self._tracker_answers |= self._goal_id > 0 and sighting.goal_id == self._goal_id
         if not sighting.usable or not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
         sigma = self._exposures.sigma(sighting.stamp_s, sighting.skew_s, self._p.target.direction_sigma_rad)
@@ -110,6 +122,15 @@ class TargetTracking(TargetEstimator):
         measurement, seen = _shifted(measurement, seen, self._track.offset)
         return self.update(measurement, seen, sighting.skew_s, now_s, "track")
 
+    def _observe_play(self, sighting: TrackSighting, seen_rad: Array) -> None:
+        """Learn the joints' play from a target at rest that is seen by eyes at rest."""
+        first, last = sorted((sighting.stamp_s, sighting.stamp_s + sighting.skew_s))
+        if self.filter.moving or self._history.speed_within(first - _RESTED_S, last) > 0.0:
+            return
+        at_left, at_right = self._history.shaft_at(sighting.stamp_s), self._history.shaft_at(last)
+        axes_rad = np.array([at_left[0], at_right[1], at_left[2]])
+        self._history.play.observe(self._history.reported_at(sighting.stamp_s), seen_rad - axes_rad)
+
     def update_fovea(self, sighting: FoveaDisparity, now_s: float) -> bool:
         """Update by the disparity at the left fovea; returns True if it was the target's and was accepted."""
         if not (sighting.usable and sighting.confidence >= self._p.target.minimum_confidence):
@@ -129,9 +150,12 @@ class TargetTracking(TargetEstimator):
         vergence = float(measurement.values[0])
         joints = self._history.shaft_at(stamp_s)
         self.inflate_for_joint_motion(stamp_s)
-        self._consistency.update_fovea(stamp_s, vergence)
+        if not self._tracker_answers:
+            self._consistency.update_fovea(stamp_s, vergence)
         self._depths.update_fovea(stamp_s, vergence)
         self._distractors.update_fovea(stamp_s, vergence, joints)
+        if self._tracker_answers:
+            return False  # the fovea sees whatever lies there, the tracker what was asked for
         if self._consistency.track_is_fresh(stamp_s, _FRESH_S) and not self._depths.track_inconsistent:
             return False  # the tracker measures the target itself, the fovea only whatever lies there
         if not self._consistency.accepts_fovea(stamp_s, vergence):
@@ -157,7 +181,7 @@ class TargetTracking(TargetEstimator):
     def update_box(self, sighting: BoxSighting, now_s: float) -> bool:
         """Update by a detection; returns True if it was the target, by its class or its place, and was accepted."""
         by_class = self.class_name is not None
-        if not sighting.usable or self.class_name not in (None, "", sighting.class_name):
+        if self._tracker_answers or not sighting.usable or self.class_name not in (None, "", sighting.class_name):
             return False
         if not (by_class or (sighting.whole and self.filter.initialised)):
             return False
@@ -245,6 +269,11 @@ class TargetTracking(TargetEstimator):
     def _is_target_track(self, sighting: TrackSighting, seen_rad: Array) -> bool:
         if self.follows_stream:
             return False
+        if self._tracker_answers:
+            self.note = self._track.adopt_requested(sighting.track_id, sighting.goal_id == self._goal_id)
+            if not self.note:
+                self._observe_play(sighting, seen_rad)
+            return not self.note
         same = sighting.track_id == self._track.track_id
         if self.class_name is not None:
             # The tracker has no classes: it counts for as long as boxes confirm that it follows the requested one.

@@ -54,6 +54,19 @@ class Goal:
 
 
 @dataclass(frozen=True)
+class TrackRequest:
+    """What the tracker is to follow for a goal: a point (x, y) of one eye's image, in normalised coordinates.
+
+    `goal_id` 0 asks for no point: the tracker is free to follow what lies at the fovea.
+    """
+
+    goal_id: int
+    stamp_s: float = math.nan
+    left_eye: bool = True
+    xy: tuple[float, float] = (math.nan, math.nan)
+
+
+@dataclass(frozen=True)
 class Outcome:
     """How a goal ended."""
 

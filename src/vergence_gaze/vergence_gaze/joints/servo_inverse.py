@@ -25,11 +25,11 @@ class ServoInverse:
     def __init__(self, rig: Rig, parameters: ServoParameters) -> None:
         tolerance_rad = parameters.hold_tolerance_rad
         servos = [joint.servo for _, joint in rig.joints.items()]
-        self._half_play = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
+        described = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
         # The next step would be no nearer.
         unresolved = _STEP_SHARE * pulse_steps_rad(rig)
-        self._tolerance = np.maximum(tolerance_rad + _MOVE_SHARE * self._half_play, unresolved)
-        self._turn_tolerance = np.maximum(tolerance_rad + 2.0 * _TURN_SHARE * self._half_play, unresolved)
+        self._tolerance = np.maximum(tolerance_rad + _MOVE_SHARE * described, unresolved)
+        self._turn_tolerance = np.maximum(tolerance_rad + 2.0 * _TURN_SHARE * described, unresolved)
         self._compensation = parameters.play_compensation
         self._direction = np.zeros(3)
 
@@ -37,16 +37,17 @@ class ServoInverse:
         """Forget each joint's last direction: the joints were moved by something else."""
         self._direction = np.zeros(3)
 
-    def command(self, desired_rad: Array, shaft_rad: Array, commanded_rad: Array) -> Array:
+    def command(self, desired_rad: Array, shaft_rad: Array, commanded_rad: Array, half_play_rad: Array) -> Array:
         """Return the command (3,) that brings the shafts to `desired_rad` (3,).
 
         Args:
             desired_rad: where each shaft should be; one that is not finite leaves its joint alone.
             shaft_rad: where each shaft is estimated to be now.
             commanded_rad: the last command sent.
+            half_play_rad: half of each joint's play, as far as it is known.
         """
         command = commanded_rad.copy()
-        arriving = np.clip(shaft_rad, commanded_rad - self._half_play, commanded_rad + self._half_play)
+        arriving = np.clip(shaft_rad, commanded_rad - half_play_rad, commanded_rad + half_play_rad)
         for i in range(3):
             error = desired_rad[i] - arriving[i]
             if not np.isfinite(error):
@@ -57,6 +58,6 @@ class ServoInverse:
                 continue
             self._direction[i] = direction
             # A long way is overdriven in full; a short way back in part: an overestimated play must not overshoot.
-            share = self._compensation if turning and abs(error) < 4.0 * self._half_play[i] else 1.0
-            command[i] = desired_rad[i] + direction * self._half_play[i] * share
+            share = self._compensation if turning and abs(error) < 4.0 * half_play_rad[i] else 1.0
+            command[i] = desired_rad[i] + direction * half_play_rad[i] * share
         return command

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from vergence_gaze.joints.play_estimator import PlayEstimator
 from vergence_rig.joint_history import JointHistory, JointSample, interpolated
 from vergence_rig.rig import JOINT_NAMES, Rig
 
@@ -29,9 +30,10 @@ _STILL = np.zeros(3)
 class ShaftHistory:
     """Reported and estimated joint angles, (3,) in the order of JOINT_NAMES [rad], over the last seconds."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, play_learning: float = 0.0) -> None:
         servos = [joint.servo for _, joint in rig.joints.items()]
-        self._half_play = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
+        described = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
+        self.play = PlayEstimator(described, play_learning)
         self._speed = np.array([servo.speed_rad_s for servo in servos])
         self._latency = np.array([servo.command_latency_s for servo in servos])
         self._longest_latency_s = float(self._latency.max())
@@ -61,8 +63,8 @@ class ShaftHistory:
 
     @property
     def half_play_rad(self) -> Array:
-        """Half of each joint's dead band and backlash together (3,)."""
-        return self._half_play
+        """Half of each joint's dead band and backlash together (3,), as described and corrected by what was seen."""
+        return self.play.half_play_rad
 
     def add(self, stamp_s: float, positions_rad: Mapping[str, float]) -> bool:
         """Add one report; a joint that it lacks keeps its last angle.
@@ -84,7 +86,7 @@ class ShaftHistory:
         shafts = self._shafts.newest.angles_rad if self.known else angles
         if not self._reported.add(stamp_s, JOINT_NAMES, angles.tolist()):
             return False
-        shafts = np.clip(shafts, angles - self._half_play, angles + self._half_play)
+        shafts = np.clip(shafts, angles - self.half_play_rad, angles + self.half_play_rad)
         return self._shafts.add(stamp_s, JOINT_NAMES, shafts.tolist())
 
     def clear(self) -> None:
@@ -105,7 +107,7 @@ class ShaftHistory:
     def shaft_at(self, stamp_s: float) -> Array:
         """Return the estimated shaft angles (3,) at `stamp_s`; the ends are held."""
         reported, (before, _) = self.reported_at(stamp_s), self._shafts.bracket(stamp_s)
-        return np.clip(before.angles_rad, reported - self._half_play, reported + self._half_play)
+        return np.clip(before.angles_rad, reported - self.half_play_rad, reported + self.half_play_rad)
 
     def reported_at(self, stamp_s: float) -> Array:
         """Return the angles (3,) at `stamp_s` as they would have been reported then; the ends are held."""

@@ -89,7 +89,7 @@ class MetricDescentLaw:
                 self._end_sweep()
         target = state.joint_goal(np.array([left_pan, left_pan + self._vergence_rad, tilt]))
         target[~state.driven] = np.nan
-        return self._inverse.command(target, state.shaft_rad, state.commanded_rad)
+        return self._inverse.command(target, state.shaft_rad, state.commanded_rad, state.half_play_rad)
 
     def residual(self, state: ControlInput) -> Array:
         """Return how far the left eye and the tilt are from the target (3,); the right eye searches."""

@@ -141,7 +141,7 @@ class PidPursuitLaw:
         limit_rad = self._p.windup_limit_rad
         before = np.where(np.isfinite(self._aim), self._aim, state.shaft_rad)
         self._aim = np.clip(before + turn, state.shaft_rad - limit_rad, state.shaft_rad + limit_rad)
-        return self._inverse.command(self._aim, state.shaft_rad, state.commanded_rad)
+        return self._inverse.command(self._aim, state.shaft_rad, state.commanded_rad, state.half_play_rad)
 
     def residual(self, state: ControlInput) -> Array:
         """Return a residual (3,) too small for a saccade: pursuit is smooth whatever the error."""

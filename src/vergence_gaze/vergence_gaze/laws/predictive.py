@@ -65,7 +65,7 @@ class PredictiveLaw:
             self._aim = None
         target = state.joint_goal(target)
         target[~state.driven] = np.nan
-        return self._inverse.command(target, state.shaft_rad, state.commanded_rad)
+        return self._inverse.command(target, state.shaft_rad, state.commanded_rad, state.half_play_rad)
 
     def _smoothed(self, expected: TargetEstimate, elapsed_s: float) -> Array:
         """Return the aim (3,) at a moving target: along with it, and towards it as far as the error is significant."""

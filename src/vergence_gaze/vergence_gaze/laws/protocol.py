@@ -18,7 +18,8 @@ class ControlInput:
     """The input of a law in one control cycle. Joint angles are (3,): pan_left, pan_right, tilt [rad].
 
     `shaft_rad` are the estimated shafts now, `commanded_rad` the last command; `driven` says which joints may move;
-    `lead_s` is the time from a command to its effect; `target` has been initialised.
+    `lead_s` is the time from a command to its effect, `half_play_rad` half of each joint's dead band and backlash;
+    `target` has been initialised.
     """
 
     now_s: float
@@ -32,6 +33,7 @@ class ControlInput:
     driven: npt.NDArray[np.bool_]
     speed_rad_s: Array
     lead_s: float
+    half_play_rad: Array
 
     def joint_goal(self, target_rad: Array) -> Array:
         """Return where the joints (3,) have to go for a target at the joint angles `target_rad` (3,).

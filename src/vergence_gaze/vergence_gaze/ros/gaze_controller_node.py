@@ -25,7 +25,15 @@ from vergence_gaze.parameters import GazeNodeParameters, GazeParameters
 from vergence_gaze.ros import gaze_messages as convert
 from vergence_gaze.ros.look_at_server import LookAtServer
 from vergence_gaze.ros.point_frames import PointFrames
-from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack, VergenceError
+from vergence_msgs.msg import (
+    BoxVergence,
+    EdgeVergence,
+    EyeRotation,
+    GazeState,
+    TargetTrack,
+    TrackRequest,
+    VergenceError,
+)
 from vergence_rig.camera import CameraModel, CameraModelError
 from vergence_rig.rig import load_rig
 
@@ -54,6 +62,7 @@ class GazeControllerNode(Node):
         diagnostics.add("gaze", self._report)
         watch = watch_qos(self, diagnostics)
         self._command = watch.create_publisher(JointState, "joint_command")
+        self._track_requests = watch.create_publisher(TrackRequest, "vergence/track_request")
         self._state = watch.create_publisher(GazeState, "gaze/state")
         self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point")
         self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1))
@@ -126,6 +135,8 @@ class GazeControllerNode(Node):
         report = command.report
         if command.joints_rad is not None:
             self._command.publish(convert.joint_command(command.joints_rad, now_s))
+        if command.track_request is not None:
+            self._track_requests.publish(convert.track_request(command.track_request, self._left, self._right))
         self._state.publish(convert.gaze_state(report))
         if math.isfinite(report.fixation_m[0]):
             self._fixation.publish(convert.point_stamped(report.fixation_m, report.stamp_s))

@@ -21,9 +21,10 @@ from vergence_gaze.estimation.observations import (
     JointResolution,
     TrackSighting,
 )
-from vergence_gaze.goals.goal import Goal, GoalKind, Outcome
+from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, TrackRequest
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack, VergenceError
+from vergence_msgs.msg import TrackRequest as TrackRequestMessage
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import eye_direction, eye_position
 from vergence_rig.rig import JOINT_NAMES
@@ -75,7 +76,20 @@ def track_sighting(message: TargetTrack, left_camera: CameraModel) -> TrackSight
         extent_rad=message.extent_width_px / left_camera.fx_px,
         usable=bool(found and math.isfinite(x) and math.isfinite(y)),
         reason=message.reason,
+        goal_id=message.goal_id,
     )
+
+
+def track_request(request: TrackRequest, left_camera: CameraModel, right_camera: CameraModel) -> TrackRequestMessage:
+    """Return the request in raw pixels of the eye's image."""
+    message = TrackRequestMessage(goal_id=request.goal_id)
+    if request.goal_id:
+        camera = left_camera if request.left_eye else right_camera
+        message.header.stamp = to_stamp(request.stamp_s)
+        message.eye = TrackRequestMessage.EYE_LEFT if request.left_eye else TrackRequestMessage.EYE_RIGHT
+        x_px, y_px = camera.ray_to_pixel(np.array([[*request.xy, 1.0]]))[0]
+        message.x_px, message.y_px = float(x_px), float(y_px)
+    return message
 
 
 def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from vergence_gaze.control.report import Command
 from vergence_gaze.estimation.observations import (
     BoxSighting,
     EdgeContrast,
@@ -51,6 +52,7 @@ class VisionModel:
     box_miss_share: float = 0.05
     field_margin_px: float = 15.0
     extent_rad: float = 0.1
+    answers_requests: bool = True
 
 
 @dataclass
@@ -89,6 +91,7 @@ class FakeHead:
             self._plants[name] = ServoPlant(servo, start + self._random.uniform(-half, half), self.begin_s)
             self._models[name] = ServoPlant(joint.servo, start, self.begin_s)
         self.reported_rad = {name: self.start_rad.get(name, 0.0) for name in JOINT_NAMES}
+        self._goal_id = 0
         self._track_id, self._lock_s = 1, self.begin_s + 0.1
         self._pending_frame: tuple[float, Array, bool] | None = None
         self._left_pixel = np.full(2, math.nan)
@@ -111,6 +114,13 @@ class FakeHead:
         for name, angle in zip(JOINT_NAMES, joints_rad, strict=True):
             self._plants[name].command(float(angle), self.time_s)
             self._models[name].command(float(angle), self.time_s)
+
+    def execute(self, command: Command) -> None:
+        """Do what a controller's cycle asks for: turn the joints, and track for a goal."""
+        if command.track_request is not None and self.vision.answers_requests:
+            self._goal_id = command.track_request.goal_id
+        if command.joints_rad is not None:
+            self.command(command.joints_rad)
 
     def true_errors_rad(self) -> Array:
         """Return (version, vergence, tilt) to the target minus the true ones (3,)."""
@@ -183,7 +193,7 @@ class FakeHead:
         sigma = 1.5 * vision.noise_px / focal
         skew_s = right_s - left_s
         if vision.track:
-            locked = left_s > self._lock_s
+            locked = left_s > self._lock_s or self._goal_id > 0
             usable = in_left and locked
             self._send(
                 arrival_s,
@@ -198,6 +208,7 @@ class FakeHead:
                     sigma,
                     vision.extent_rad,
                     usable,
+                    goal_id=self._goal_id,
                 ),
             )
         on_fovea = in_left and math.hypot(*left_xy) < 0.05

@@ -66,6 +66,13 @@ class Alignment:
         dx, dy = x_px - centre_x, y_px - centre_y
         return centre_x + cos * dx - sin * dy, centre_y + sin * dx + cos * dy - self.vertical_px
 
+    def aligned(self, x_px: float, y_px: float, width_px: int, height_px: int) -> tuple[float, float]:
+        """Return the position in the aligned right image of a point of the original one [px]."""
+        cos, sin = math.cos(self.roll_rad), math.sin(self.roll_rad)
+        centre_x, centre_y = (width_px - 1) / 2.0, (height_px - 1) / 2.0
+        dx, dy = x_px - centre_x, y_px - centre_y + self.vertical_px
+        return centre_x + cos * dx + sin * dy, centre_y - sin * dx + cos * dy
+
 
 class Aligner:
     """Determines the alignment of successive pairs by `mode`: none, calibrated, or auto.

@@ -1,5 +1,6 @@
 """All measurements on a pair of images, stage by stage, so that each can be published as soon as it is available."""
 
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -10,13 +11,17 @@ from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
+from vergence_metric.tracking.eye_view import EyeView
 from vergence_metric.tracking.protocol import Tracker
 from vergence_metric.tracking.registry import make_tracker
+from vergence_metric.tracking.request import PairMemory, StoredPair, TrackRequest
 from vergence_metric.tracking.saccade_detector import StampedEyeAngles
 from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import Rig
+
+_SAME_IMAGE_S = 0.1  # a request is for the pair nearest to its stamp, at most this far from it
 
 Models = tuple[CameraModel, CameraModel]
 
@@ -29,8 +34,12 @@ class PairMeasurement:
         self._rig_models = (CameraModel(rig.left_camera), CameraModel(rig.right_camera))
         self._tracker: Tracker | None = None
         self._models: Models | None = None
+        self._memory = PairMemory(parameters.tracker.memory_s)
+        self._requests: deque[TrackRequest] = deque()
         self._ids_used = 0
         self._newest_id = 0
+        self.unmet_request = ""
+        """Why the newest request could not be passed on to the tracker; empty if it was."""
         self._parameters = p = parameters
         self._metric = EdgeMetric(p.edges, p.contrast, p.alignment)
         self._classifier = FovealVergenceClassifier(p.verged)
@@ -54,6 +63,7 @@ class PairMeasurement:
             self._tracker = None
         if p.tracker != before.tracker:
             self._tracker = None
+            self._memory = PairMemory(p.tracker.memory_s)
 
     def edge(self, left: NDArray[Any], right: NDArray[Any]) -> EdgeMetricResult:
         """Return metric I of a pair of images of one size; raises ImageShapeError for others."""
@@ -70,6 +80,10 @@ class PairMeasurement:
     def verged(self, edge: EdgeMetricResult, error_px: float, confidence: float) -> bool:
         """Return whether the eyes are verged, by foveal contrast, signed error, and the result of the last pair."""
         return self._classifier.update(edge.foveal_contrast, error_px, confidence)
+
+    def request_track(self, request: TrackRequest) -> None:
+        """Let the tracker follow a point, from the next pair on; may be called from another thread."""
+        self._requests.append(request)
 
     def track(
         self,
@@ -97,9 +111,30 @@ class PairMeasurement:
         if self._tracker is None or models != self._models:
             self._models, self._ids_used = models, self._newest_id
             self._tracker = make_tracker(self._parameters.tracker, self._estimator, *models, self._baseline_m)
+        self._pass_on_requests(self._tracker, edge)
+        views = tuple(
+            EyeView(model, pan_rad, eyes.tilt_rad)
+            for model, pan_rad in zip(models, (eyes.pan_left_rad, eyes.pan_right_rad), strict=True)
+        )
+        self._memory.add(StoredPair(stamp_s, edge.left_grey, edge.right_grey, (views[0], views[1])))
         track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes, samples)
         self._newest_id = self._ids_used + track.track_id
         return replace(track, track_id=self._newest_id)
+
+    def _pass_on_requests(self, tracker: Tracker, edge: EdgeMetricResult) -> None:
+        while self._requests:
+            request, self.unmet_request = self._requests.popleft(), ""
+            if not request.goal_id:
+                tracker.lock_here()
+                continue
+            if not request.left_eye:
+                height, width = edge.right_grey.shape
+                request = replace(request, pixel=edge.alignment.aligned(*request.pixel, width, height))
+            pair = self._memory.nearest(request.stamp_s, _SAME_IMAGE_S)
+            if pair is None:
+                self.unmet_request = f"no pair is stored for goal {request.goal_id}, stamp {request.stamp_s:.3f} s"
+            else:
+                tracker.request(request, pair)
 
     def _unlocked(self, reason: str) -> Track:
         return Track.nowhere(self._newest_id, TrackStatus.UNLOCKED, reason)

@@ -25,9 +25,9 @@ from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.ros.edge_messages import edge_message, error_message
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
 from vergence_metric.ros.stereo_node import StereoNode
-from vergence_metric.ros.track_messages import track_message
+from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_metric.tracking.parameters import TrackerParameters
-from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
+from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
 from vergence_rig.rig import load_rig
 
 _JOINT_SAMPLES_NS = 500_000_000  # longer than two pairs can be apart while the tracker still follows
@@ -52,6 +52,7 @@ class EdgeMetricNode(StereoNode):
         pairing = self._settings.get(PairingParameters)
         self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit)
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
+        self._request_subscription = qos.create_subscription(TrackRequest, "vergence/track_request", self._on_request)
         self._settings.on_change(self._on_settings)
         diagnostics.add("measurement", self._report)
 
@@ -59,6 +60,9 @@ class EdgeMetricNode(StereoNode):
         stereo = settings.get(StereoParameters)
         cv2.setNumThreads(stereo.threads or -1)
         self._stereo.set_parameters(stereo, settings.get(PairingParameters))
+
+    def _on_request(self, message: TrackRequest) -> None:
+        self._measurement.request_track(track_request(message))
 
     def _measure(self, pair: ImagePair) -> None:
         self._measurement.set_parameters(_measurement_parameters(self._settings))
@@ -102,6 +106,8 @@ class EdgeMetricNode(StereoNode):
         worked, dropped = self._worker.worked, self._worker.dropped
         values: dict[str, object] = {"measured": worked, "dropped": dropped}
         values |= self._stereo.decode_times.summary() | self._times.summary()
+        if self._measurement.unmet_request:
+            values["track_request"] = self._measurement.unmet_request
         if self._failure is not None:
             return Report(ERROR, f"measuring the last pair failed: {self._failure}", values)
         if dropped:

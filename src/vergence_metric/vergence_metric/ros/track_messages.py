@@ -4,11 +4,13 @@ import math
 
 from std_msgs.msg import Header
 
-from vergence_common.stamps import to_stamp
+from vergence_common.stamps import to_seconds, to_stamp
 from vergence_metric.disparity.angular_disparity import AngularDisparity
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
+from vergence_metric.tracking.request import TrackRequest
 from vergence_metric.tracking.track import Track
 from vergence_msgs.msg import TargetTrack
+from vergence_msgs.msg import TrackRequest as TrackRequestMessage
 
 
 def track_message(
@@ -20,6 +22,7 @@ def track_message(
     return TargetTrack(
         header=header,
         pair_skew_s=pair_skew_s,
+        goal_id=track.goal_id,
         track_id=track.track_id,
         lock_stamp=to_stamp(track.lock_stamp_s if math.isfinite(track.lock_stamp_s) else 0.0),
         left_x_px=track.left_px[0],
@@ -34,4 +37,16 @@ def track_message(
         confidence=track.confidence,
         status=int(track.status),
         reason=track.reason,
+    )
+
+
+def track_request(message: TrackRequestMessage) -> TrackRequest:
+    """Return the request; its pixel is one of the raw image."""
+    sized = message.width_px > 0.0 and message.height_px > 0.0
+    return TrackRequest(
+        goal_id=message.goal_id,
+        stamp_s=to_seconds(message.header.stamp),
+        left_eye=message.eye == TrackRequestMessage.EYE_LEFT,
+        pixel=(message.x_px, message.y_px),
+        extent_px=(message.width_px, message.height_px) if sized else None,
     )

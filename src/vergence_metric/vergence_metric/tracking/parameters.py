@@ -122,6 +122,42 @@ class TrackerParameters(Parameters):
         maximum=60.0,
         formerly="track_give_up_s",
     )
+    memory_s: float = parameter(
+        1.0,
+        "time for which pairs are stored, so that a requested point is learnt in the image in which it was seen",
+        unit="s",
+        minimum=0.1,
+        maximum=10.0,
+    )
+    request_search_px: int = parameter(
+        40,
+        "half side of the search for a requested point after the eyes have turned, at first",
+        unit="px",
+        minimum=8,
+        maximum=300,
+    )
+    request_search_max_px: int = parameter(
+        110,
+        "largest half side of the search for a requested point; it grows by tracker.search_growth_px_s",
+        unit="px",
+        minimum=8,
+        maximum=600,
+    )
+    request_similarity: float = parameter(
+        0.6,
+        "least correlation with the surroundings of a requested point at which it is found",
+        minimum=0.1,
+        maximum=0.99,
+    )
+    anchor_similarity: float = parameter(
+        0.8,
+        "least correlation with the surroundings of a requested point at which its position is corrected for drift",
+        minimum=0.1,
+        maximum=0.99,
+    )
+    anchor_px: int = parameter(
+        6, "half side of the search that corrects the drift of a requested point", unit="px", minimum=2, maximum=40
+    )
     relock_s: float = parameter(
         0.5,
         "time at rest, after a target is lost, until the tracker locks on what is at the fovea",

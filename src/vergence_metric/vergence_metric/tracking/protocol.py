@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from vergence_metric.disparity.protocol import Image
+from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.saccade_detector import StampedEyeAngles
 from vergence_metric.tracking.track import Track
 from vergence_rig.geometry import EyeAngles
@@ -19,4 +20,12 @@ class Tracker(Protocol):
         self, left: Image, right: Image, stamp_s: float, eyes: EyeAngles, samples: Iterable[StampedEyeAngles] = ()
     ) -> Track:
         """Return where the target is in a pair; see `tracker.TargetTracker.update`."""
+        ...
+
+    def lock_here(self) -> None:
+        """Be free of any request: follow what lies at the fovea once the eyes rest."""
+        ...
+
+    def request(self, request: TrackRequest, pair: StoredPair) -> None:
+        """Follow the requested point from now on; `pair` is the one in which it was seen."""
         ...

@@ -25,7 +25,7 @@ class Track:
 
     `left_px`, `right_px` (x, y) in the images given, `disparity_px` = x_left - x_right, `extent_px` (width, height) of
     the locked region at its present scale. `confidence` is the similarity to the target's appearance, lowered where the
-    disparity could not be measured.
+    disparity could not be measured. `goal_id` is that of the request which the track answers, 0 for none.
     """
 
     track_id: int
@@ -39,6 +39,7 @@ class Track:
     confidence: float
     status: TrackStatus
     reason: str
+    goal_id: int = 0
 
     @classmethod
     def nowhere(cls, track_id: int, status: TrackStatus, reason: str, lock_stamp_s: float = math.nan) -> "Track":

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vergence_metric.tracking.eye_view import EyeView, Pixel
+from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_metric.tracking.target_appearance import TargetAppearance
 
 _MOTION_MEMORY = 0.6  # share of the old angular velocity kept at each frame
@@ -31,6 +32,8 @@ class Target:
     hidden: bool = False
     right_seen_s: float = -math.inf
     parallax_rad: float = math.nan  # angle from the left eye's ray to the right eye's, in the plane of the baseline
+    patch: RememberedPatch | None = None  # of a requested target
+    goal_id: int = 0
     sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # recent stamps and directions
 
     def predicted(self, stamp_s: float) -> np.ndarray:

@@ -6,6 +6,9 @@ templates follow it in the left image, and the disparity is measured at the poin
 object near the head has other disparities elsewhere. Appearance and disparity must both continue as predicted: an
 occluder has another disparity and is not followed. The hidden target is then searched around its predicted direction
 until it is found again.
+
+A request names the point to follow instead: it is learnt in the image in which it was seen, before the eyes moved, and
+found again by that (`remembered_patch.py`), whatever lies at the fovea. Until the next request nothing else is tracked.
 """
 
 import math
@@ -19,6 +22,8 @@ from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, Di
 from vergence_metric.pairs.frame_motion import frame_motion_px
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.parameters import TrackerParameters
+from vergence_metric.tracking.request import StoredPair, TrackRequest
+from vergence_metric.tracking.requested_target import USUAL_EXTENT_PX, find_requested, requested_target
 from vergence_metric.tracking.saccade_detector import EyeMotion, SaccadeDetector, StampedEyeAngles
 from vergence_metric.tracking.segmentation import Segmenter, is_plausible, offset_inside
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
@@ -27,7 +32,6 @@ from vergence_metric.tracking.tracked_target import Target
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 
-_USUAL_EXTENT_PX = (60.0, 60.0)
 _UNMISTAKABLE_SIMILARITY = 0.8
 _KEPT_SHARE = 0.9  # of a saccade: the largest distance from the fovea at which the target was not left
 _CONFIDENCE_WITHOUT_DISPARITY = 0.6
@@ -61,6 +65,12 @@ class TargetTracker:
         # Recent distances of the target from the fovea, up to the start of the current saccade: (stamp, px).
         self._distances: deque[tuple[float, float]] = deque()
 
+    def request(self, request: TrackRequest, pair: StoredPair) -> None:
+        """Follow a point of a stored pair from now on, on behalf of the request's goal."""
+        self._track_id += 1
+        self._wants_lock = False
+        self._target = requested_target(self._track_id, request, pair, self._estimator)
+
     def lock_here(self) -> None:
         """Lock again on the object at the fovea as soon as the eyes are at rest, as after a saccade."""
         self._target, self._wants_lock = None, True
@@ -86,6 +96,8 @@ class TargetTracker:
             EyeView(self._cameras[1], eyes.pan_right_rad, eyes.tilt_rad),
         )
         before, self._before, self._stamp_s = self._before, left, stamp_s
+        if self._target is not None and self._target.patch is not None:
+            return self._follow(self._target, left, right, stamp_s, views)
         self._wants_lock |= motion.jumped
         if self._target is not None:
             track = self._follow(self._target, left, right, stamp_s, views)
@@ -139,7 +151,7 @@ class TargetTracker:
         self._track_id += 1
         self._wants_lock = False
         self._distances.clear()
-        appearance = TargetAppearance(left, point, extent or _USUAL_EXTENT_PX)
+        appearance = TargetAppearance(left, point, extent or USUAL_EXTENT_PX)
         direction = views[0].direction(point)
         self._target = Target(self._track_id, stamp_s, appearance, stamp_s, direction, np.zeros(3), extent is not None)
         self._target.aside_px = offset_inside(fovea, point, extent)
@@ -151,14 +163,17 @@ class TargetTracker:
         """Find the target again in the next pair."""
         p = self._parameters
         hidden_s = stamp_s - target.seen_s if target.hidden else 0.0
-        if hidden_s > p.give_up_s:
+        if hidden_s > p.give_up_s and target.patch is None:
             self._target, self._lost_s = None, stamp_s
             return self._untracked(TrackStatus.LOST, f"target lost: not found for {hidden_s:.1f} s")
         sighting = self._find(target, left, stamp_s, views)
         if sighting is None:
             target.hidden = True
             return self._hidden(target, f"target predicted outside the left image, hidden for {hidden_s:.1f} s")
-        needed = p.reacquire_similarity if target.hidden else p.min_similarity
+        if target.hidden:
+            needed = p.reacquire_similarity if target.patch is None else p.request_similarity
+        else:
+            needed = p.min_similarity
         if sighting.similarity < needed or not _inside(sighting.pixel, left):
             target.hidden = True
             return self._hidden(
@@ -169,7 +184,7 @@ class TargetTracker:
         disparity = self._estimator.estimate(left, right, fixated, expected_px)
         if not disparity.ok and fixated != sighting.pixel:
             disparity = self._estimator.estimate(left, right, sighting.pixel, expected_px)
-        if disparity.ok and expected_px is not None and target.disparity_age_s(stamp_s) < 0.5:
+        if target.patch is None and disparity.ok and expected_px is not None and target.disparity_age_s(stamp_s) < 0.5:
             jump = disparity.horizontal_px - expected_px
             # Servos without feedback are off their reported angles while they move: unchanged appearance counts more.
             if abs(jump) > p.disparity_jump_px and sighting.similarity < _UNMISTAKABLE_SIMILARITY:
@@ -190,6 +205,8 @@ class TargetTracker:
 
     def _find(self, target: Target, left: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Sighting | None:
         """Return the best sighting in the left image; None if it is predicted outside."""
+        if target.patch is not None:
+            return find_requested(target, target.patch, left, stamp_s, views[0], self._parameters)
         p = self._parameters
         expected = views[0].pixel(target.predicted(stamp_s))
         # A hidden target has moved on as predicted, or stayed where it was last seen.
@@ -206,7 +223,8 @@ class TargetTracker:
         return max(sightings, key=lambda one: one.similarity)
 
     def _hidden(self, target: Target, reason: str) -> Track:
-        return Track.nowhere(self._track_id, TrackStatus.LOST, reason, target.lock_stamp_s)
+        nowhere = Track.nowhere(self._track_id, TrackStatus.LOST, reason, target.lock_stamp_s)
+        return replace(nowhere, goal_id=target.goal_id)
 
     def _visible(
         self, target: Target, sighting: Sighting, disparity: Disparity, views: tuple[EyeView, EyeView]
@@ -229,6 +247,7 @@ class TargetTracker:
             similarity * _CONFIDENCE_WITHOUT_DISPARITY,
             TrackStatus.OCCLUDED,
             f"target not found in the right eye: {disparity.reason}",
+            target.goal_id,
         )
         if not is_plausible(disparity, expected_px, self._parameters.disparity_jump_px):
             return track
