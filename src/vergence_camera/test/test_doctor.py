@@ -31,9 +31,9 @@ class Pair:
         for camera, rate_hz in zip(self.cameras, rates_hz, strict=True):
             self.stops.append(camera.play(lambda number: self.picture, rate_hz))
 
-    def findings(self, patience_s: float = 60.0) -> dict[str, Finding]:
+    def findings(self, timeout_s: float = 60.0) -> dict[str, Finding]:
         machine = self.machine
-        found = check(kernel=machine.kernel, tree=machine.tree, trial_s=0.5, patience_s=patience_s, max_skew_s=0.05)
+        found = check(kernel=machine.kernel, tree=machine.tree, trial_s=0.5, timeout_s=timeout_s, max_skew_s=0.05)
         assert machine.kernel.open_descriptors == []
         return {finding.name.split()[0] + finding.name[-1]: finding for finding in found}
 
@@ -86,13 +86,13 @@ def test_no_bandwidth_for_the_second(pair: Pair) -> None:
 
 def test_a_camera_that_another_process_uses(pair: Pair) -> None:
     pair.cameras[0].streamer = 1
-    finding = pair.findings(patience_s=0.1)["stream0"]
+    finding = pair.findings(timeout_s=0.1)["stream0"]
     assert finding.ok
     assert "/diagnostics" in finding.message
 
 
 def test_silence(pair: Pair) -> None:
-    finding = pair.findings(patience_s=0.1)["stream0"]
+    finding = pair.findings(timeout_s=0.1)["stream0"]
     assert not finding.ok
     assert "0 frames received" in finding.message
 

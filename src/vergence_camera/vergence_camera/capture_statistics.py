@@ -103,7 +103,7 @@ class CaptureStatistics:
         self._arrivals_s.append(self._now_s())
 
     def too_old(self) -> None:
-        """A frame was older than asked and has been dropped."""
+        """A frame was older than max_age_s and has been dropped."""
         self._counts.too_old += 1
 
     def published(self, stamp_to_publish_s: float) -> None:

@@ -45,7 +45,7 @@ def check(
     kernel: Kernel | None = None,
     tree: SystemTree | None = None,
     trial_s: float = 1.5,
-    patience_s: float = 3.0,
+    timeout_s: float = 3.0,
     max_skew_s: float = 0.02,
 ) -> list[Finding]:
     """Look at every camera, let all of them stream together for `trial_s`, and compare each two.
@@ -53,7 +53,7 @@ def check(
     Args:
         kernel, tree: replace the machine's own in tests.
         trial_s: length of the trial by the frames' own times; 0 leaves it out.
-        patience_s: the trial of a camera that gives fewer frames ends after this time.
+        timeout_s: the trial of a camera that gives fewer frames ends after this time.
         max_skew_s: largest time between two frames that are paired.
     """
     kernel = kernel or LinuxKernel()
@@ -65,7 +65,7 @@ def check(
         findings += _check_device(entry)
     usable = [entry for entry in listed if not entry.trouble]
     if trial_s > 0.0 and usable:
-        trials = _stream_together(kernel, usable, trial_s, patience_s)
+        trials = _stream_together(kernel, usable, trial_s, timeout_s)
         for entry, trial in zip(usable, trials, strict=True):
             findings.append(_check_trial(entry, trial))
         for one, other in itertools.combinations(range(len(usable)), 2):
@@ -130,12 +130,10 @@ def _remedies(faults: Sequence[str]) -> str:
     return "; ".join(fault.partition(": ")[2] for fault in faults)
 
 
-def _stream_together(
-    kernel: Kernel, entries: Sequence[ListedDevice], trial_s: float, patience_s: float
-) -> list[_Trial]:
+def _stream_together(kernel: Kernel, entries: Sequence[ListedDevice], trial_s: float, timeout_s: float) -> list[_Trial]:
     trials = [_Trial() for _ in entries]
     ready = threading.Barrier(len(entries))
-    limits = (trial_s, patience_s)
+    limits = (trial_s, timeout_s)
     threads = [
         threading.Thread(target=_stream, args=(kernel, entry.device.path, trial, ready, *limits), daemon=True)
         for entry, trial in zip(entries, trials, strict=True)
@@ -148,7 +146,7 @@ def _stream_together(
 
 
 def _stream(
-    kernel: Kernel, path: str, trial: _Trial, ready: threading.Barrier, trial_s: float, patience_s: float
+    kernel: Kernel, path: str, trial: _Trial, ready: threading.Barrier, trial_s: float, timeout_s: float
 ) -> None:
     port = ControlPort()
     source = V4l2Source(kernel, lambda: path, path, _TRIAL_MODE, user=port)
@@ -160,7 +158,7 @@ def _stream(
         ready.wait()
         if trial.error is not None:
             return
-        until_s = time.monotonic() + patience_s
+        until_s = time.monotonic() + timeout_s
         while trial.length_s < trial_s and time.monotonic() < until_s:
             try:
                 frame = source.read(0.1)

@@ -31,7 +31,7 @@ def faults_of_pair(left: EyeCamera, right: EyeCamera, skew_s: float, max_skew_s:
     rates = (left.rate_hz, right.rate_hz)
     if all(math.isfinite(rate) for rate in rates) and max(rates) > 1.05 * min(rates):
         faults.append(
-            f"{left.name} runs at {left.rate_hz:.1f} Hz, {right.name} at {right.rate_hz:.1f} Hz: ask both for one "
+            f"{left.name} runs at {left.rate_hz:.1f} Hz, {right.name} at {right.rate_hz:.1f} Hz: set the same "
             "rate_hz, and fix the exposure, which a dim room makes longer than a frame (lock: hold)"
         )
     differing = [

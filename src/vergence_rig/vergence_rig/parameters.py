@@ -73,7 +73,7 @@ class UnknownParameterError(ParameterError):
 class ParameterSpec:
     """Everything about one parameter but its value.
 
-    `kind` is bool, int, float or str, `is_list` says that the value is a tuple of them. `minimum` and `maximum` are
+    `kind` is bool, int, float or str, `is_list` is True if the value is a tuple of them. `minimum` and `maximum` are
     inclusive and hold for every element of a list; `choices` lists the allowed strings. `formerly` is the
     full name that the parameter had in an earlier release.
     """
@@ -122,7 +122,7 @@ class ParameterSpec:
     def _normalised_element(self, element: Any, whole: Any) -> Any:
         if self.kind is float and isinstance(element, int) and not isinstance(element, bool):
             element = float(element)
-        if type(element) is not self.kind:  # not isinstance: True must not pass for a whole number
+        if type(element) is not self.kind:  # not isinstance: True is no whole number
             raise ParameterError(self.name, whole, self.allowed)
         if isinstance(element, float) and not math.isfinite(element):
             raise ParameterError(self.name, whole, self.allowed)

@@ -37,7 +37,7 @@ class AviRecording:
 
     def pictures(self) -> Iterator[Picture]:
         """See Recording."""
-        with self._path.open("rb", buffering=0) as file:  # the demuxer asks for what it needs and no more
+        with self._path.open("rb", buffering=0) as file:  # the demuxer reads only what it needs
             header = read_header(file, self.identity)
             yield from frames(file, header, self.identity)
 

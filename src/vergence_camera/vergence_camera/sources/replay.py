@@ -64,7 +64,7 @@ class Replay:
         return self._recording.identity
 
     def open(self) -> Mode:
-        """See FrameSource. The size and format must be as asked; the rate is the recording's unless one was given."""
+        """See FrameSource. Size and format must be as requested; the rate is the recording's unless one was given."""
         self.close()
         found = self._recording.mode()
         rate = self._asked_rate_hz or found.rate_hz or self._default_rate_hz

@@ -85,7 +85,7 @@ class FakeCamera:
         return end
 
     def unplug(self) -> None:
-        """Pull the plug: open descriptors answer 'no such device'."""
+        """Pull the plug: open descriptors then fail with 'no such device'."""
         with self.changed:
             self.plugged, self.streamer = False, 0
             self.changed.notify_all()

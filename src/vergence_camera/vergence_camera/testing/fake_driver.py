@@ -1,4 +1,4 @@
-"""What a webcam's driver answers to each ioctl.
+"""A webcam driver's replies to each ioctl.
 
 It keeps the driver's side of the contract: a format that is not offered becomes the nearest one, one process streams
 at a time, a frame without a queued buffer is lost but counted, an automatic control makes its manual one inactive.

@@ -229,6 +229,6 @@ class Controls:
             raise camera_error(error, f"setting control '{spec.name}'", self._path) from error
 
 
-# A UVC camera that stalls a control request answers with EPIPE or EIO; the stream is none the worse.
+# A UVC camera that stalls a control request fails with EPIPE or EIO; the stream is not affected.
 _REFUSALS = {errno.EINVAL, errno.ERANGE, errno.EACCES, errno.EBUSY, errno.EPERM, errno.EPIPE, errno.EIO}
 _KNOWN_GOVERNORS = {v4l2.CID_EXPOSURE_AUTO, v4l2.CID_AUTO_WHITE_BALANCE, v4l2.CID_AUTOGAIN}

@@ -30,7 +30,7 @@ def camera_error(error: OSError, doing: str, path: str) -> CameraError:
     if error.errno == errno.ENOSPC:
         return UsbBandwidthError(
             f"{reason}: this is USB bandwidth, not the disk. Plug the two cameras into ports of different USB "
-            "controllers (list_cameras shows them), or ask for MJPG, a smaller size or a lower rate"
+            "controllers (list_cameras shows them), or choose MJPG, a smaller size or a lower rate"
         )
     if error.errno in _GONE:
         return UnpluggedError(f"{reason}: it was unplugged or its USB link failed")

@@ -1,4 +1,4 @@
-"""What a capture device is and which formats, sizes and rates it offers."""
+"""A capture device's identity, and the formats, sizes and rates it offers."""
 
 import errno
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ Answer = TypeVar("Answer", bound=Structure)
 
 @dataclass(frozen=True)
 class OfferedSize:
-    """One size of one pixel format; `rates_hz` from fast to slow, empty where the driver does not say."""
+    """One size of one pixel format; `rates_hz` from fast to slow, empty where the driver lists none."""
 
     pixel_format: str
     width_px: int
@@ -31,7 +31,7 @@ class OfferedSize:
 
 @dataclass(frozen=True)
 class CaptureDevice:
-    """What QUERYCAP says of a device that can stream."""
+    """The result of QUERYCAP for a device that can stream."""
 
     driver: str
     card: str
