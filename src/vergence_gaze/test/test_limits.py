@@ -36,10 +36,19 @@ def test_a_long_sleep_is_not_made_up_for(limits: CommandLimits) -> None:
     assert sent[2] == pytest.approx(-0.7 + RIG.tilt.speed_rad_s * LONGEST_STEP_S)
 
 
-def test_eyes_that_would_diverge_look_at_infinity_between_both(limits: CommandLimits) -> None:
-    sent = limits.nearest(np.array([0.2, 0.1, 0.0]))
+def test_eyes_that_would_diverge_look_at_infinity_between_both() -> None:
+    sent = CommandLimits(RIG.with_servos(IDEAL)).nearest(np.array([0.2, 0.1, 0.0]))
     np.testing.assert_allclose(sent[:2], [0.15, 0.15], atol=1e-8)
     assert sent[1] >= sent[0]
+
+
+def test_commands_may_diverge_by_the_play_so_that_the_eyes_become_parallel(limits: CommandLimits) -> None:
+    servo = RIG.pan_left.servo
+    half_play = 0.5 * (servo.dead_band_rad + servo.backlash_rad)
+    sent = limits.nearest(np.array([0.2, 0.1, 0.0]))
+    np.testing.assert_allclose(sent[:2], [0.15 + half_play, 0.15 - half_play], atol=1e-8)
+    # each shaft stays behind its command by half its play
+    assert (sent[1] + half_play) - (sent[0] - half_play) >= 0.0
 
 
 def test_vergence_limit_on_the_way(limits: CommandLimits) -> None:

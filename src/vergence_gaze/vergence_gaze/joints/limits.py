@@ -16,14 +16,20 @@ _MARGIN_RAD = 1e-9
 
 
 class CommandLimits:
-    """Joint, speed and minimum-vergence limits of one rig. Angles are (3,): pan_left, pan_right, tilt [rad]."""
+    """Joint, speed and minimum-vergence limits of one rig's commands. Angles are (3,): pan_left, pan_right, tilt [rad].
+
+    `minimum_vergence_rad` is that of the rig less the described play of both pans.
+    """
 
     def __init__(self, rig: Rig) -> None:
         joints = [joint for _, joint in rig.joints.items()]
         self.lower_rad = np.array([joint.lower_rad for joint in joints])
         self.upper_rad = np.array([joint.upper_rad for joint in joints])
         self.speed_rad_s = np.array([joint.speed_rad_s for joint in joints])
-        self.minimum_vergence_rad = rig.minimum_vergence_rad
+        # The eyes' vergence is limited, not that of the commands: a shaft stays behind its command by half its play, and
+        # commands that may not diverge by that could not turn the eyes to anything far away.
+        play_rad = sum(0.5 * (pan.servo.dead_band_rad + pan.servo.backlash_rad) for pan in joints[:2])
+        self.minimum_vergence_rad = rig.minimum_vergence_rad - play_rad
 
     def nearest(self, angles_rad: Array) -> Array:
         """Return the angles nearest to `angles_rad` that the limits allow: finite ones are expected."""
