@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="Servos calibrated and a running head identified, by hand or by vision.",
+    description="Calibration of servos and identification of a running head, by hand or by vision.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

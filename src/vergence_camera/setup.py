@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="One USB webcam to topics; two instances make the pair.",
+    description="A USB camera, an MJPEG stream or a recording as topics; two instances make the pair.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

@@ -14,6 +14,6 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="The ROS rim written once: images, parameters, diagnostics, QoS, node main.",
+    description="What every node shares: conversion of images, parameters, diagnostics, QoS and the main function.",
     license="Apache-2.0",
 )

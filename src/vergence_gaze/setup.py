@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="Metrics to joint commands: the goals, the estimate of the target and the control laws.",
+    description="From metrics to joint commands: goals, estimation of the target, control laws.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="Synchronised pairs to vergence metrics, signed disparity and the class-free tracker.",
+    description="Vergence metrics, signed disparity, a class-free tracker and the eyes' rotation, from synchronised image pairs.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

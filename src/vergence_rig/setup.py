@@ -14,6 +14,6 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="The rig in pure Python: its description, geometry, cameras and servo plants. No ROS in it.",
+    description="Description, geometry, cameras and servo plants of the rig, and declared parameters, without ROS.",
     license="Apache-2.0",
 )
