@@ -155,6 +155,12 @@ class TrackerParameters(Parameters):
         minimum=0.1,
         maximum=0.99,
     )
+    anchor_gain: float = parameter(
+        0.02,
+        "gain in correlation with the surroundings of a requested point from which its position is corrected for drift",
+        minimum=0.0,
+        maximum=1.0,
+    )
     anchor_px: int = parameter(
         6, "half side of the search that corrects the drift of a requested point", unit="px", minimum=2, maximum=40
     )

@@ -46,10 +46,14 @@ def find_requested(
     if not _is_inside(expected, left):
         return None
     followed = target.appearance.follow(left, expected)
-    anchor = patch.find(left, view, view.direction(followed.pixel), p.anchor_px)
-    if anchor is None or anchor.similarity < p.anchor_similarity:
+    direction = view.direction(followed.pixel)
+    anchor, here = patch.find(left, view, direction, p.anchor_px), patch.find(left, view, direction, 1)
+    if anchor is None or here is None or anchor.similarity < p.anchor_similarity:
         return followed
-    return replace(followed, pixel=anchor.pixel, similarity=max(followed.similarity, anchor.similarity))
+    # Along an edge, or without texture, other places look as much like it: only a clear gain is drift.
+    drifted = anchor.similarity > here.similarity + p.anchor_gain
+    pixel = anchor.pixel if drifted else followed.pixel
+    return replace(followed, pixel=pixel, similarity=max(followed.similarity, anchor.similarity))
 
 
 def _in_left_eye(pixel: Pixel, pair: StoredPair, estimator: DisparityEstimator) -> Pixel:
