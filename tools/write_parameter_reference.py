@@ -11,7 +11,8 @@ _HEAD = """# Parameters
 
 Every executable's parameters, made from the code by `python tools/write_parameter_reference.py`. The shipped
 `config/<executable>.yaml` holds the same defaults. *fixed* ones are read once at the start; the others may be changed
-while the node runs, and a request is applied as a whole or not at all.
+while the node runs, and a request is applied as a whole or not at all. A former name ends the node with a message that
+names the new one.
 """
 
 
@@ -30,7 +31,8 @@ def page() -> str:
 def _row(prefix: str, spec: ParameterSpec) -> str:
     default = "**required**" if spec.required else f"`{_yaml(spec.default)}`"
     fixed = " *fixed*" if spec.read_only else ""
-    cells = (f"`{prefix}{spec.name}`", default, spec.allowed, spec.description + fixed)
+    former = f"; formerly `{spec.formerly}`" if spec.formerly else ""
+    cells = (f"`{prefix}{spec.name}`", default, spec.allowed, spec.description + fixed + former)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
