@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="Vergence metrics, signed disparity, a class-free tracker and the eyes' rotation, from synchronised image pairs.",
+    description="Synchronised pairs to vergence metrics, signed disparity, tracks and the eyes' rotation.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

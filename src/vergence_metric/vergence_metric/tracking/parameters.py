@@ -149,6 +149,13 @@ class TrackerParameters(Parameters):
         minimum=0.1,
         maximum=0.99,
     )
+    still_target_rad_s: float = parameter(
+        0.05,
+        "a requested target that was slower than this rests: after a saccade it is found by its surroundings",
+        unit="rad/s",
+        minimum=0.0,
+        maximum=10.0,
+    )
     anchor_similarity: float = parameter(
         0.8,
         "least correlation with the surroundings of a requested point at which its position is corrected for drift",

@@ -69,13 +69,23 @@ class RememberedPatch:
         sides = self._sides(_POINT_HALF_PX, 1)
         found = []
         for place, similarity in places:
-            pixel, at_point = _best_near(image, _part(template, sides), sides, place)
+            pixel, at_point, _ = _best_near(image, _part(template, sides), sides, place, _REFINED_WITHIN_PX)
             off = math.hypot(pixel[0] - expected[0], pixel[1] - expected[1]) / max(reach_px, 1)
             found.append((similarity + at_point - _PRIOR * off**2, similarity, pixel))
         found.sort(reverse=True)
         _, similarity, pixel = found[0]
         rival = max((other for _, other, _ in found[1:]), default=-1.0)
         return PatchSighting(pixel, similarity, rival)
+
+    def refine(self, image: Image, view: EyeView, pixel: Pixel, reach_px: int) -> tuple[PatchSighting, float]:
+        """Return where the point itself is within `reach_px` of a pixel, and its similarity at that pixel.
+
+        Only its nearest surroundings count: those of a moving object change.
+        """
+        template = self._warped(self._mapping(view, view.direction(pixel)), _POINT_HALF_PX)
+        sides = self._sides(_POINT_HALF_PX, 1)
+        place, similarity, here = _best_near(image, _part(template, sides), sides, pixel, reach_px)
+        return PatchSighting(place, similarity, -1.0), here
 
     def _mapping(self, view: EyeView, direction: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the affine map (2, 3) from offsets about the expected pixel now to pixels of the remembered crop."""
@@ -146,16 +156,17 @@ def _part(template: Image, sides: tuple[int, int, int, int]) -> Image:
     return np.ascontiguousarray(template[half - top : half + bottom + 1, half - left : half + right + 1])
 
 
-def _best_near(image: Image, template: Image, sides: tuple[int, int, int, int], place: Pixel) -> tuple[Pixel, float]:
-    """Return the sub-pixel place within a few pixels where the template fits best, and its correlation."""
+def _best_near(
+    image: Image, template: Image, sides: tuple[int, int, int, int], place: Pixel, reach: int
+) -> tuple[Pixel, float, float]:
+    """Return the sub-pixel place within reach where the template fits best, its correlation, and that at `place`."""
     left, top, _, _ = sides
-    reach = _REFINED_WITHIN_PX
     x0, y0 = round(place[0]) - left - reach, round(place[1]) - top - reach
     area = cut(image, x0, y0, template.shape[1] + 2 * reach, template.shape[0] + 2 * reach)
     surface = _correlation(area, template)
     j, i = divmod(int(surface.argmax()), surface.shape[1])
     di, dj = _vertex(surface[j], i), _vertex(surface[:, i], j)
-    return (x0 + left + i + di, y0 + top + j + dj), float(surface[j, i])
+    return (x0 + left + i + di, y0 + top + j + dj), float(surface[j, i]), float(surface[reach, reach])
 
 
 def _correlation(area: Image, template: Image) -> NDArray[np.float32]:

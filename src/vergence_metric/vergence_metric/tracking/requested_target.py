@@ -21,7 +21,7 @@ def requested_target(track_id: int, request: TrackRequest, pair: StoredPair, est
     patch = RememberedPatch(pair.left, pair.views[0], point)
     appearance = TargetAppearance(pair.left, point, request.extent_px or USUAL_EXTENT_PX)
     target = Target(track_id, pair.stamp_s, appearance, pair.stamp_s, patch.direction, np.zeros(3), True)
-    target.patch, target.goal_id, target.hidden = patch, request.goal_id, True
+    target.patch, target.goal_id, target.hidden, target.found = patch, request.goal_id, True, False
     disparity = estimator.estimate(pair.left, pair.right, point)
     if disparity.ok:
         shifted = (point[0] - disparity.horizontal_px, point[1] - disparity.vertical_px)
@@ -29,31 +29,34 @@ def requested_target(track_id: int, request: TrackRequest, pair: StoredPair, est
     return target
 
 
-def find_requested(
+def find_by_surroundings(
     target: Target, patch: RememberedPatch, left: Image, stamp_s: float, view: EyeView, parameters: TrackerParameters
 ) -> Sighting | None:
-    """Return the best sighting of a requested target in the left image; None if it is predicted outside."""
-    p, direction = parameters, target.predicted(stamp_s)
-    if target.hidden:
-        reach_px = p.request_search_px + p.search_growth_px_s * (stamp_s - target.seen_s)
-        found = patch.find(left, view, direction, min(round(reach_px), p.request_search_max_px))
-        if found is None:
-            return None
-        if found.similarity >= p.request_similarity:
-            target.appearance = TargetAppearance(left, found.pixel, target.appearance.extent_px)
-        return Sighting(found.pixel, found.similarity, 0)
-    expected = view.pixel(direction)
-    if not _is_inside(expected, left):
+    """Return where a requested target that rests is, by what surrounded it at its request; None outside the image.
+
+    The surroundings are larger than the target and surer; of a target that moves they say nothing.
+    """
+    reach_px = parameters.request_search_px + parameters.search_growth_px_s * (stamp_s - target.seen_s)
+    reach_px = min(reach_px, parameters.request_search_max_px)
+    found = patch.find(left, view, target.predicted(stamp_s), round(reach_px))
+    if found is None:
         return None
-    followed = target.appearance.follow(left, expected)
-    direction = view.direction(followed.pixel)
-    anchor, here = patch.find(left, view, direction, p.anchor_px), patch.find(left, view, direction, 1)
-    if anchor is None or here is None or anchor.similarity < p.anchor_similarity:
-        return followed
+    if found.similarity >= parameters.request_similarity:
+        target.appearance = TargetAppearance(left, found.pixel, target.appearance.extent_px)
+        target.found = True
+    return Sighting(found.pixel, found.similarity, 0)
+
+
+def without_drift(
+    followed: Sighting, patch: RememberedPatch, left: Image, view: EyeView, parameters: TrackerParameters
+) -> Sighting:
+    """Return the sighting put right where the point, as it was when it was requested, is clearly beside it."""
+    p = parameters
+    anchor, here = patch.refine(left, view, followed.pixel, p.anchor_px)
     # Along an edge, or without texture, other places look as much like it: only a clear gain is drift.
-    drifted = anchor.similarity > here.similarity + p.anchor_gain
-    pixel = anchor.pixel if drifted else followed.pixel
-    return replace(followed, pixel=pixel, similarity=max(followed.similarity, anchor.similarity))
+    if anchor.similarity < max(p.anchor_similarity, here + p.anchor_gain):
+        return followed
+    return replace(followed, pixel=anchor.pixel, similarity=max(followed.similarity, anchor.similarity))
 
 
 def _in_left_eye(pixel: Pixel, pair: StoredPair, estimator: DisparityEstimator) -> Pixel:
@@ -65,7 +68,3 @@ def _in_left_eye(pixel: Pixel, pair: StoredPair, estimator: DisparityEstimator) 
     if not disparity.ok:
         return pair.views[0].pixel(pair.views[1].direction(pixel))
     return pixel[0] + disparity.horizontal_px, pixel[1] - disparity.vertical_px
-
-
-def _is_inside(pixel: Pixel, image: Image) -> bool:
-    return bool(0.0 <= pixel[0] <= image.shape[1] - 1 and 0.0 <= pixel[1] <= image.shape[0] - 1)

@@ -33,6 +33,7 @@ class Target:
     right_seen_s: float = -math.inf
     parallax_rad: float = math.nan  # angle from the left eye's ray to the right eye's, in the plane of the baseline
     patch: RememberedPatch | None = None  # of a requested target
+    found: bool = True  # since its request
     goal_id: int = 0
     sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # recent stamps and directions
 
@@ -60,6 +61,11 @@ class Target:
         self.sightings.append((stamp_s, direction))
         while self.sightings[0][0] < stamp_s - _COAST_FROM_S:
             self.sightings.popleft()
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Its speed over the recent sightings [rad/s], 0 while there are too few."""
+        return float(np.linalg.norm(self._steady_velocity()))
 
     def _steady_velocity(self) -> np.ndarray:
         """Return the velocity (3,) over the recent sightings, robust to single ones (Theil-Sen median slope).

@@ -23,7 +23,12 @@ from vergence_metric.pairs.frame_motion import frame_motion_px
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair, TrackRequest
-from vergence_metric.tracking.requested_target import USUAL_EXTENT_PX, find_requested, requested_target
+from vergence_metric.tracking.requested_target import (
+    USUAL_EXTENT_PX,
+    find_by_surroundings,
+    requested_target,
+    without_drift,
+)
 from vergence_metric.tracking.saccade_detector import EyeMotion, SaccadeDetector, StampedEyeAngles
 from vergence_metric.tracking.segmentation import Segmenter, is_plausible, offset_inside
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
@@ -171,7 +176,7 @@ class TargetTracker:
             target.hidden = True
             return self._hidden(target, f"target predicted outside the left image, hidden for {hidden_s:.1f} s")
         if target.hidden:
-            needed = p.reacquire_similarity if target.patch is None else p.request_similarity
+            needed = p.reacquire_similarity if target.found else p.request_similarity
         else:
             needed = p.min_similarity
         if sighting.similarity < needed or not _inside(sighting.pixel, left):
@@ -205,9 +210,11 @@ class TargetTracker:
 
     def _find(self, target: Target, left: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Sighting | None:
         """Return the best sighting in the left image; None if it is predicted outside."""
-        if target.patch is not None:
-            return find_requested(target, target.patch, left, stamp_s, views[0], self._parameters)
         p = self._parameters
+        if target.patch is not None and target.hidden and target.speed_rad_s <= p.still_target_rad_s:
+            sighting = find_by_surroundings(target, target.patch, left, stamp_s, views[0], p)
+            if not target.found or (sighting and sighting.similarity >= p.request_similarity):
+                return sighting
         expected = views[0].pixel(target.predicted(stamp_s))
         # A hidden target has moved on as predicted, or stayed where it was last seen.
         candidates = [expected, views[0].pixel(target.direction)] if target.hidden else [expected]
@@ -215,7 +222,8 @@ class TargetTracker:
         if not candidates:
             return None
         if not target.hidden:
-            return target.appearance.follow(left, expected)
+            followed = target.appearance.follow(left, expected)
+            return without_drift(followed, target.patch, left, views[0], p) if target.patch else followed
         reach = round(p.search_px + p.search_growth_px_s * (stamp_s - target.seen_s))
         if distance(candidates[0], candidates[-1]) < reach:
             candidates = candidates[:1]
