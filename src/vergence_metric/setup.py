@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="Synchronised pairs to vergence metrics, signed disparity, tracks and the eyes' rotation.",
+    description="Vergence metrics, disparity, class-free tracker and the eyes' rotation, from synchronised pairs.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
