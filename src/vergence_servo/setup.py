@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="Joint commands to servo pulses within limits: drivers, guardian and servo_node; for a Raspberry Pi.",
+    description="Joint commands to servo pulses within limits: drivers, guardian, servo_node; for a Pi.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

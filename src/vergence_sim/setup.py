@@ -14,7 +14,7 @@ setup(
     zip_safe=True,
     maintainer="Vergence maintainers",
     maintainer_email="vergence-maintainers@example.org",
-    description="A simulated head in a furnished room, on MuJoCo, in place of cameras, servos and surroundings.",
+    description="A simulated head in a furnished room or before a photograph, in place of a real one.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

@@ -18,7 +18,7 @@ from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_metric.measurement.edge_metric import EdgeMetric
 from vergence_metric.ros.edge_metric_node import EdgeMetricNode
-from vergence_msgs.msg import EdgeVergence, TargetTrack, VergenceError
+from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
 
 pytestmark = pytest.mark.graph
 
@@ -351,3 +351,28 @@ def test_timings_of_every_stage_are_told(graph: Any, eyes: Eyes) -> None:
         assert float(values(status)[f"{stage}_median_ms"]) > 0.0
     images = graph.diagnostic("left images", lambda s: "age_median_ms" in values(s))
     assert values(images)["size_px"] == "320x240"
+
+
+def test_a_request_is_answered_with_its_goals_id(graph: Any, node: EdgeMetricNode, eyes: Eyes) -> None:
+    requests = graph.client.create_publisher(TrackRequest, "vergence/track_request", 10)
+    graph.wait_until(lambda: requests.get_subscription_count() > 0, "the node subscribes to requests")
+    eyes.describe()
+    graph.wait_until(lambda: node._stereo.models_for(view(0)) is not None, "the cameras are known")
+
+    def publish_joints() -> None:
+        stamp = from_nanoseconds(eyes.stamp_ns + 33 * MS)
+        zero = JointState(header=Header(stamp=stamp), name=["pan_left", "pan_right", "tilt"], position=[0.0] * 3)
+        eyes.joints.publish(zero)
+        graph.wait_until(lambda: node._joints.covers(to_nanoseconds(stamp)), "the joints are known")
+
+    publish_joints()
+    answers(graph, eyes, view(0), view(6))
+    wanted = TrackRequest(goal_id=9, eye=TrackRequest.EYE_LEFT, x_px=100.0, y_px=80.0)
+    wanted.header.stamp = from_nanoseconds(eyes.stamp_ns)
+    requests.publish(wanted)
+    graph.wait_until(lambda: node._measurement._requests, "the request has arrived")
+    publish_joints()
+    *_, track = answers(graph, eyes, view(0), view(6))
+    assert (track.goal_id, track.status) == (9, TargetTrack.STATUS_OK), track.reason
+    assert (track.left_x_px, track.left_y_px) == pytest.approx((100.0, 80.0), abs=0.5)
+    assert track.disparity_px == pytest.approx(6.0, abs=0.3)

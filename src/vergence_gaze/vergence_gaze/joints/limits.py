@@ -16,7 +16,7 @@ _MARGIN_RAD = 1e-9
 
 
 class CommandLimits:
-    """Joint, speed and minimum-vergence limits of one rig's commands. Angles are (3,): pan_left, pan_right, tilt [rad].
+    """Joint, speed and minimum-vergence limits of a rig's commands. Angles are (3,): pan_left, pan_right, tilt [rad].
 
     `minimum_vergence_rad` is that of the rig less the described play of both pans.
     """
@@ -26,8 +26,8 @@ class CommandLimits:
         self.lower_rad = np.array([joint.lower_rad for joint in joints])
         self.upper_rad = np.array([joint.upper_rad for joint in joints])
         self.speed_rad_s = np.array([joint.speed_rad_s for joint in joints])
-        # The eyes' vergence is limited, not that of the commands: a shaft stays behind its command by half its play, and
-        # commands that may not diverge by that could not turn the eyes to anything far away.
+        # The eyes' vergence is limited, not that of the commands: a shaft stays behind its command by half its play,
+        # and commands that may not diverge by that could not turn the eyes to anything far away.
         play_rad = sum(0.5 * (pan.servo.dead_band_rad + pan.servo.backlash_rad) for pan in joints[:2])
         self.minimum_vergence_rad = rig.minimum_vergence_rad - play_rad
 

@@ -1,0 +1,224 @@
+"""A point that was asked for: learnt in its own image, found again after the eyes have turned, on rendered boards."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vergence_metric.alignment.alignment import Alignment
+from vergence_metric.disparity import make_estimator
+from vergence_metric.disparity.parameters import DisparityParameters
+from vergence_metric.tracking.eye_view import EyeView
+from vergence_metric.tracking.parameters import TrackerParameters
+from vergence_metric.tracking.remembered_patch import RememberedPatch
+from vergence_metric.tracking.request import PairMemory, StoredPair, TrackRequest
+from vergence_metric.tracking.track import TrackStatus
+from vergence_metric.tracking.tracker import TargetTracker
+from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import EyeAngles, eye_position, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.rig import default_rig
+
+RIG = default_rig()
+CAMERA = CameraModel(RIG.left_camera)
+K = np.array([[539.0, 0, 319.5], [0, 539.0, 239.5], [0, 0, 1.0]])
+FRAME_S = 1 / 30
+
+
+def texture(seed, shape, sigmas=(1.5, 4.0, 12.0)):
+    rng = np.random.default_rng(seed)
+    out = sum(cv2.GaussianBlur(rng.standard_normal(shape).astype(np.float32), (0, 0), s) * s for s in sigmas)
+    return np.clip(128 + 45 * (out - out.mean()) / out.std(), 0, 255).astype(np.float32)
+
+
+WALL = texture(1, (1300, 2000))
+BOARD = texture(2, (160, 160))
+WALL_M, BOARD_M = 2.0, (0.7, 0.08, 0.03)
+
+
+def project(point_m, left, eyes):
+    pan = eyes.pan_left_rad if left else eyes.pan_right_rad
+    ray = rotation_rig_from_optical(pan, eyes.tilt_rad).T @ (np.array(point_m) - eye_position(left, RIG.baseline_m))
+    u, v = CAMERA.ray_to_pixel(ray[None])[0]
+    return float(u), float(v)
+
+
+def paste(image, surface, center_m, width_m, left, eyes):
+    per_px = width_m / surface.shape[1]
+    right, down = np.array([0.0, -per_px, 0.0]), np.array([0.0, 0.0, -per_px])
+    corner = np.array(center_m) - right * (surface.shape[1] - 1) / 2 - down * (surface.shape[0] - 1) / 2
+    columns = np.column_stack([right, down, corner - eye_position(left, RIG.baseline_m)])
+    pan = eyes.pan_left_rad if left else eyes.pan_right_rad
+    homography = K @ rotation_rig_from_optical(pan, eyes.tilt_rad).T @ columns
+    cv2.warpPerspective(surface, homography, (640, 480), dst=image, borderMode=cv2.BORDER_TRANSPARENT)
+
+
+def view(left, eyes, board_m=BOARD_M, gain=1.0):
+    """Both images of a board before a wall, as an eye at these angles sees them."""
+    image = np.full((480, 640), 90, np.float32)
+    paste(image, WALL, (WALL_M, 0.0, 0.0), 5.0, left, eyes)
+    if board_m is not None:
+        paste(image, BOARD, board_m, 0.12, left, eyes)
+    image = gain * image + 2.0 * cv2.randn(np.empty((480, 640), np.float32), 0, 1)
+    return np.clip(image, 0, 255).astype(np.uint8)
+
+
+def views(eyes):
+    return EyeView(CAMERA, eyes.pan_left_rad, eyes.tilt_rad), EyeView(CAMERA, eyes.pan_right_rad, eyes.tilt_rad)
+
+
+AHEAD = EyeAngles(0.0, 0.0, 0.0)
+
+
+class Stage:
+    """A tracker that sees pair after pair and keeps those pairs."""
+
+    def __init__(self, **parameters):
+        cv2.setRNGSeed(1)
+        estimator = make_estimator(DisparityParameters())
+        self.tracker = TargetTracker(TrackerParameters(**parameters), estimator, CAMERA, CAMERA, RIG.baseline_m)
+        self.memory, self.stamp_s = PairMemory(1.0), 0.0
+
+    def show(self, eyes, reported=None, board_m=BOARD_M):
+        self.stamp_s += FRAME_S
+        left, right = view(True, eyes, board_m), view(False, eyes, board_m, gain=0.9)
+        reported = reported or eyes
+        self.memory.add(StoredPair(self.stamp_s, left, right, views(reported)))
+        return self.tracker.update(left, right, self.stamp_s, reported)
+
+    def ask(self, point_m, eyes, left_eye=True):
+        pair = self.memory.nearest(self.stamp_s, 0.1)
+        self.tracker.request(TrackRequest(5, self.stamp_s, left_eye, project(point_m, left_eye, eyes)), pair)
+
+
+def turned(eyes, pan_deg, tilt_deg):
+    pan, tilt = math.radians(pan_deg), math.radians(tilt_deg)
+    return EyeAngles(eyes.pan_left_rad + pan, eyes.pan_right_rad + pan, eyes.tilt_rad + tilt)
+
+
+ASIDE_M = (BOARD_M[0], BOARD_M[1] + 0.03, BOARD_M[2] - 0.02)
+
+
+@pytest.mark.parametrize("wrong_deg", [(0.0, 0.0), (0.8, -0.7), (-1.5, 1.0)])
+def test_the_clicked_point_is_found_after_a_saccade_whose_joints_are_reported_wrong(wrong_deg):
+    stage = Stage()
+    stage.show(AHEAD)
+    stage.ask(ASIDE_M, AHEAD)
+    landed = gaze_for_point(np.array(ASIDE_M), RIG.baseline_m)
+    really = turned(landed, *wrong_deg)
+    for _ in range(3):
+        track = stage.show(really, reported=landed)
+    assert (track.status, track.goal_id) == (TrackStatus.OK, 5), track.reason
+    true_left, true_right = project(ASIDE_M, True, really), project(ASIDE_M, False, really)
+    np.testing.assert_allclose(track.left_px, true_left, atol=1.0)
+    assert track.disparity_px == pytest.approx(true_left[0] - true_right[0], abs=0.5)
+
+
+def test_a_point_clicked_in_the_right_image_is_the_same_point():
+    stage = Stage()
+    stage.show(AHEAD)
+    stage.ask(ASIDE_M, AHEAD, left_eye=False)
+    track = stage.show(AHEAD)
+    np.testing.assert_allclose(track.left_px, project(ASIDE_M, True, AHEAD), atol=1.5)
+
+
+def test_whatever_lies_at_the_fovea_is_not_the_target():
+    stage = Stage()
+    stage.show(AHEAD)
+    stage.ask(ASIDE_M, AHEAD)
+    elsewhere = turned(AHEAD, -20.0, 0.0)
+    tracks = [stage.show(elsewhere) for _ in range(30)]
+    assert {track.goal_id for track in tracks} == {5}
+    inside = [track for track in tracks if track.status is TrackStatus.OK]
+    true = project(ASIDE_M, True, elsewhere)
+    assert all(np.hypot(*np.subtract(track.left_px, true)) < 3.0 for track in inside)
+
+
+def test_a_target_that_is_gone_is_lost_for_as_long_as_it_is():
+    stage = Stage()
+    stage.show(AHEAD)
+    stage.ask(BOARD_M, AHEAD)
+    assert stage.show(AHEAD).status is TrackStatus.OK
+    tracks = [stage.show(AHEAD, board_m=None) for _ in range(120)]
+    assert {track.status for track in tracks[2:]} == {TrackStatus.LOST}
+    assert {track.goal_id for track in tracks} == {5}
+    assert stage.show(AHEAD).status is TrackStatus.OK
+
+
+def test_a_moving_target_is_followed_not_its_surroundings():
+    stage = Stage()
+    stage.show(AHEAD)
+    stage.ask(BOARD_M, AHEAD)
+    place = np.array(BOARD_M)
+    for _ in range(40):
+        place = place - np.array([0.0, 0.004, 0.0])
+        track = stage.show(AHEAD, board_m=tuple(place))
+    assert track.status is TrackStatus.OK, track.reason
+    np.testing.assert_allclose(track.left_px, project(place, True, AHEAD), atol=4.0)
+
+
+def test_drift_is_put_right():
+    stage = Stage()
+    stage.show(AHEAD)
+    stage.ask(BOARD_M, AHEAD)
+    stage.show(AHEAD)
+    stage.tracker._target.appearance.pixel = tuple(np.add(stage.tracker._target.appearance.pixel, (3.0, -2.0)))
+    for _ in range(3):
+        track = stage.show(AHEAD)
+    np.testing.assert_allclose(track.left_px, project(BOARD_M, True, AHEAD), atol=0.7)
+
+
+def test_without_a_request_it_locks_on_the_fovea_again():
+    stage = Stage()
+    stage.show(AHEAD)
+    stage.ask(BOARD_M, AHEAD)
+    stage.show(AHEAD)
+    stage.tracker.lock_here()
+    tracks = [stage.show(AHEAD) for _ in range(12)]
+    assert (tracks[-1].status, tracks[-1].goal_id) == (TrackStatus.OK, 0), tracks[-1].reason
+
+
+def test_a_patch_at_the_corner_of_its_image_is_matched_by_what_the_image_shows():
+    image = view(True, AHEAD)
+    corner = (12.0, 15.0)
+    patch = RememberedPatch(image, views(AHEAD)[0], corner)
+    eyes = turned(AHEAD, 12.0, -8.0)
+    view_now = views(eyes)[0]
+    found = patch.find(view(True, eyes), view_now, patch.direction, 30)
+    np.testing.assert_allclose(found.pixel, view_now.pixel(patch.direction), atol=1.5)
+
+
+def test_a_patch_predicted_outside_the_image_is_not_looked_for():
+    patch = RememberedPatch(view(True, AHEAD), views(AHEAD)[0], (320.0, 240.0))
+    eyes = turned(AHEAD, 60.0, 0.0)
+    assert patch.find(view(True, eyes), views(eyes)[0], patch.direction, 30) is None
+
+
+def test_a_patch_without_texture_is_found_nowhere():
+    blank = np.full((480, 640), 120, np.uint8)
+    patch = RememberedPatch(blank, views(AHEAD)[0], (320.0, 240.0))
+    assert patch.find(blank, views(AHEAD)[0], patch.direction, 30) is None
+
+
+def stored(stamp_s):
+    blank = np.zeros((4, 4), np.uint8)
+    return StoredPair(stamp_s, blank, blank, views(AHEAD))
+
+
+def test_the_memory_holds_its_time_and_gives_the_nearest():
+    memory = PairMemory(1.0)
+    for stamp_s in np.arange(0.0, 3.01, 0.1):
+        memory.add(stored(float(stamp_s)))
+    assert memory.nearest(2.46, 0.1).stamp_s == pytest.approx(2.5)
+    assert memory.nearest(1.0, 0.1) is None
+    memory.add(stored(0.5))
+    assert memory.nearest(3.0, 0.1) is None
+
+
+@given(st.floats(-20, 20), st.floats(-0.1, 0.1), st.floats(0, 639), st.floats(0, 479))
+def test_aligned_is_the_inverse_of_unaligned(vertical_px, roll_rad, x, y):
+    alignment = Alignment("calibrated", vertical_px, roll_rad)
+    there = alignment.unaligned(*alignment.aligned(x, y, 640, 480), 640, 480)
+    np.testing.assert_allclose(there, (x, y), atol=1e-9)
