@@ -75,29 +75,29 @@ def node(graph: Any) -> GazeControllerNode:
 def test_a_reading_moves_the_vergence_that_the_controller_reckons_with(graph: Any, node: GazeControllerNode) -> None:
     encoder, learnt = Encoder(graph), node._controller.vergence_offset
     off_rad = 0.001
-    encoder.until(lambda: learnt.believed >= 2, off_rad)
+    encoder.until(lambda: learnt.accepted >= 2, off_rad)
     assert learnt.offset_rad == pytest.approx(off_rad, abs=2e-4)
     assert math.sqrt(learnt.variance) <= 3e-4
-    status = graph.diagnostic("gaze", lambda s: int(values(s).get("eye_rotations_believed", "0")) >= 2)
-    assert "eye_rotation_refused" not in values(status)
+    status = graph.diagnostic("gaze", lambda s: int(values(s).get("eye_rotations_accepted", "0")) >= 2)
+    assert "eye_rotation_rejection" not in values(status)
 
 
 def test_a_reading_beyond_servos_and_mounts_is_refused_and_reported(graph: Any, node: GazeControllerNode) -> None:
     encoder, learnt = Encoder(graph), node._controller.vergence_offset
-    encoder.until(lambda: learnt.refused >= 2 and "contradicts" in learnt.refusal, 0.09)
-    assert learnt.believed == 0
+    encoder.until(lambda: learnt.rejected >= 2 and "contradicts" in learnt.rejection, 0.09)
+    assert learnt.accepted == 0
     assert learnt.offset_rad == 0.0
-    status = graph.diagnostic("gaze", lambda s: "contradicts" in values(s).get("eye_rotation_refused", ""))
-    assert values(status)["eye_rotations_believed"] == "0"
+    status = graph.diagnostic("gaze", lambda s: "contradicts" in values(s).get("eye_rotation_rejection", ""))
+    assert values(status)["eye_rotations_accepted"] == "0"
 
 
 def test_what_the_encoder_does_not_believe_itself_is_not_counted(graph: Any, node: GazeControllerNode) -> None:
     encoder, learnt = Encoder(graph), node._controller.vergence_offset
     for _ in range(5):
         encoder.read(0.001, EyeRotation.STATUS_UNCERTAIN)
-    encoder.until(lambda: learnt.believed >= 1, 0.001)
+    encoder.until(lambda: learnt.accepted >= 1, 0.001)
     assert learnt.offset_rad == pytest.approx(0.001, abs=3e-4)
     encoder.read(0.3, EyeRotation.STATUS_CONTRADICTORY)
-    before = learnt.believed
-    encoder.until(lambda: learnt.believed > before, 0.001)
+    before = learnt.accepted
+    encoder.until(lambda: learnt.accepted > before, 0.001)
     assert learnt.offset_rad == pytest.approx(0.001, abs=3e-4)

@@ -90,6 +90,7 @@ class Stage:
 
     def ask(self, point_m, eyes, left_eye=True):
         pair = self.memory.nearest(self.stamp_s, 0.1)
+        assert pair is not None
         self.tracker.request(TrackRequest(5, self.stamp_s, left_eye, project(point_m, left_eye, eyes)), pair)
 
 
@@ -164,7 +165,10 @@ def test_drift_is_put_right():
     stage.show(AHEAD)
     stage.ask(BOARD_M, AHEAD)
     stage.show(AHEAD)
-    stage.tracker._target.appearance.pixel = tuple(np.add(stage.tracker._target.appearance.pixel, (3.0, -2.0)))
+    target = stage.tracker._target
+    assert target is not None
+    x, y = target.appearance.pixel
+    target.appearance.pixel = (x + 3.0, y - 2.0)
     for _ in range(3):
         track = stage.show(AHEAD)
     np.testing.assert_allclose(track.left_px, project(BOARD_M, True, AHEAD), atol=0.7)
@@ -187,6 +191,7 @@ def test_a_patch_at_the_corner_of_its_image_is_matched_by_what_the_image_shows()
     eyes = turned(AHEAD, 12.0, -8.0)
     view_now = views(eyes)[0]
     found = patch.find(view(True, eyes), view_now, patch.direction, 30)
+    assert found is not None
     np.testing.assert_allclose(found.pixel, view_now.pixel(patch.direction), atol=1.5)
 
 
@@ -211,7 +216,9 @@ def test_the_memory_holds_its_time_and_gives_the_nearest():
     memory = PairMemory(1.0)
     for stamp_s in np.arange(0.0, 3.01, 0.1):
         memory.add(stored(float(stamp_s)))
-    assert memory.nearest(2.46, 0.1).stamp_s == pytest.approx(2.5)
+    nearest = memory.nearest(2.46, 0.1)
+    assert nearest is not None
+    assert nearest.stamp_s == pytest.approx(2.5)
     assert memory.nearest(1.0, 0.1) is None
     memory.add(stored(0.5))
     assert memory.nearest(3.0, 0.1) is None
