@@ -7,7 +7,10 @@ from pathlib import Path
 import mujoco
 import pytest
 
+from vergence_rig.rig import default_rig
+from vergence_sim.parameters import SimParameters, WorldParameters
 from vergence_sim.renderer import RenderError
+from vergence_sim.scene import build_scene
 from vergence_sim.simulator import Simulator
 
 THREADS = 4
@@ -49,3 +52,18 @@ def test_simulators_made_and_closed_in_threads_leave_no_memory_behind() -> None:
     after_mb = resident_mb()
     finished.set()
     assert after_mb - before_mb < MOST_GROWTH_MB
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="only Linux says how much memory a process has")
+def test_rooms_beyond_the_cache_leave_no_memory_behind() -> None:
+    rig = default_rig()
+
+    def build(seed: int) -> None:
+        build_scene(rig, SimParameters(world=WorldParameters(seed=seed)), 0.8)
+
+    for seed in range(101, 106):  # more than the cache holds
+        build(seed)
+    before_mb = resident_mb()
+    for seed in range(106, 110):
+        build(seed)
+    assert resident_mb() - before_mb < MOST_GROWTH_MB

@@ -92,6 +92,8 @@ class ModelBuilder:
         model = mujoco.MjModel.from_xml_string(xml, self._files)
         # The pictures stay in MuJoCo's cache and in the model's compiler, as large as the model each: drop both.
         mujoco.mj_clearCache(mujoco.mj_getCache())
+        # A builder and its room refer to one another: the collector frees them late.
+        self._files.clear()
         return copy.copy(model)
 
     def _file(self, name: str, image: Image) -> str:

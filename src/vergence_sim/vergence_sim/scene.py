@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from vergence_rig.rig import Rig
+from vergence_sim.memory import return_free_memory
 from vergence_sim.model_builder import HIDDEN_GROUP, ModelBuilder
 from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.pictures import book_cover, cube_faces, look_alike_faces
@@ -200,7 +201,9 @@ def _compiled(
     builder.furniture()
     builder.room()
     builder.head(fovy_rad, dict(zip(("left", "right"), mounts, strict=True)))
-    return builder.compile(rig.left_camera.width_px, rig.left_camera.height_px, light)
+    model = builder.compile(rig.left_camera.width_px, rig.left_camera.height_px, light)
+    return_free_memory()
+    return model
 
 
 def build_scene(rig: Rig, parameters: SimParameters, fovy_rad: float, textured: bool = True) -> mujoco.MjModel:
