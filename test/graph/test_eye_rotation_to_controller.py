@@ -29,7 +29,7 @@ class Encoder:
             graph.wait_until(lambda p=publisher: p.get_subscription_count() > 0, "the controller subscribes")
 
     def rest(self) -> float:
-        """Tell the joints and return the stamp."""
+        """Publish the joints and return the stamp."""
         now_s = float(self.graph.client.get_clock().now().nanoseconds * 1e-9)
         positions = [-0.5 * VERGENCE_RAD, 0.5 * VERGENCE_RAD, 0.0]
         header = Header(stamp=to_stamp(now_s))
@@ -37,7 +37,7 @@ class Encoder:
         return now_s
 
     def read(self, off_rad: float, status: int = EyeRotation.STATUS_OK) -> None:
-        """Tell a vergence that is off the joints'."""
+        """Publish a vergence that is off the joints'."""
         header = Header(stamp=to_stamp(self.rest()), frame_id="left")
         self.readings.publish(
             EyeRotation(
@@ -45,7 +45,7 @@ class Encoder:
                 vergence_rad=VERGENCE_RAD + off_rad,
                 sigma_rad=3e-4,
                 status=status,
-                reason="" if status == EyeRotation.STATUS_OK else "not to be believed",
+                reason="" if status == EyeRotation.STATUS_OK else "rejected",
             )
         )
 

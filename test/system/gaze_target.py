@@ -1,4 +1,4 @@
-"""Somebody who looks for the controller: publishes gaze/target 20 times a second until ended.
+"""Stands in for a user of the controller: publishes gaze/target 20 times a second until ended.
 
 python gaze_target.py X_M Y_M Z_M
 """
