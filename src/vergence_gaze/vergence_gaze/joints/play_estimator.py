@@ -1,8 +1,8 @@
 """How much play each joint really has, from what the eyes see of its reversals.
 
-A servo that reverses first crosses its dead band and backlash: the image moves by less than the command did, and what is
-missing is the play. rig.yaml's figure comes from a data sheet; a wrong one makes the eyes land beside the target, or swing
-about it for ever.
+A servo that reverses first crosses its dead band and backlash: the image moves by less than the command did, and what
+is missing is the play. rig.yaml's figure comes from a data sheet; a wrong one makes the eyes land beside the target, or
+swing about it for ever.
 """
 
 import numpy as np
