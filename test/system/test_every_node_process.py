@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from vergence_bringup.node_table import NODES
+from vergence_bringup.node_table import NODES, parameter_groups
 from vergence_bringup.ros.processes import find_node
 
 pytestmark = pytest.mark.system
 
-PATIENCE_S = 150.0
+TIMEOUT_S = 150.0
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 
 
@@ -21,7 +21,7 @@ def _command(executable: str, *arguments: str) -> list[str]:
 
 
 def _run(executable: str, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(_command(executable, *arguments), capture_output=True, text=True, timeout=PATIENCE_S)
+    return subprocess.run(_command(executable, *arguments), capture_output=True, text=True, timeout=TIMEOUT_S)
 
 
 def _own_lines(text: str, executable: str) -> list[str]:
@@ -39,7 +39,9 @@ def test_an_unknown_parameter_ends_the_node(executable: str, domain_id: int) -> 
 
 @pytest.mark.parametrize("executable", sorted(NODES))
 def test_a_rig_that_is_not_there_ends_the_node(executable: str, domain_id: int, tmp_path: Path) -> None:
-    arguments = ["-p", "device:=/dev/null"] if executable == "camera_node" else []
+    specs = [(prefix, spec) for prefix, group in parameter_groups(executable) for spec in group.specs()]
+    required = [f"{prefix}{spec.name}:=/dev/null" for prefix, spec in specs if spec.required]
+    arguments = [argument for value in required for argument in ("-p", value)]
     result = _run(executable, "-p", f"rig:={tmp_path / 'absent.yaml'}", *arguments)
     assert result.returncode == 2
     (line,) = _own_lines(result.stderr, executable)
@@ -64,7 +66,7 @@ def test_sigterm_at_any_moment_ends_sim_node_without_complaint(delay_s: float, d
             process.wait(delay_s)
         process.terminate()
         try:
-            _, errors = process.communicate(timeout=PATIENCE_S)
+            _, errors = process.communicate(timeout=TIMEOUT_S)
         finally:
             process.kill()
     # While Python still imports, the signal simply ends it: there is nothing to release yet.
@@ -76,7 +78,7 @@ def test_sigterm_at_any_moment_ends_sim_node_without_complaint(delay_s: float, d
 def test_a_signal_ends_a_running_node_with_status_0(number: int, domain_id: int) -> None:
     with subprocess.Popen(_command("sim_node"), stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
-        watchdog = threading.Timer(PATIENCE_S, process.kill)
+        watchdog = threading.Timer(TIMEOUT_S, process.kill)
         watchdog.start()
         lines = []
         for line in process.stderr:
