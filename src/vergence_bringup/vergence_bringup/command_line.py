@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
-    "demo": ("vergence_bringup.demo.ros.command", "run the whole graph on the simulated head and write a report"),
+    "demo": ("vergence_bringup.demo.ros.command", "run the graph on the simulated head and write a report"),
     "measure": ("vergence_bringup.commands.measure", "compute metric I (and II) of two stored images"),
     "calibrate": ("vergence_bringup.commands.calibrate", "calibrate the cameras from chessboard or ChArUco views"),
     "identify": (

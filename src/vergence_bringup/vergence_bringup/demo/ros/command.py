@@ -1,4 +1,4 @@
-"""`vergence demo`: the whole graph on the simulated head, every node as a process, and a report."""
+"""`vergence demo`: the graph on the simulated head, every node as a process, and a report."""
 
 import argparse
 import contextlib
