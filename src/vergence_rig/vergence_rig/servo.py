@@ -32,6 +32,11 @@ class ServoSpec(Parameters):
     )
 
     @property
+    def half_play_rad(self) -> float:
+        """Half of dead band and backlash together: how far a shaft at rest may be from its pulse [rad]."""
+        return 0.5 * (self.dead_band_rad + self.backlash_rad)
+
+    @property
     def uncertainty_rad(self) -> float:
         """Largest deviation of the shaft from its commanded angle at rest [rad]."""
         return 0.5 * (self.dead_band_rad + self.backlash_rad + self.pulse_step_rad)

@@ -28,7 +28,7 @@ class CommandLimits:
         self.speed_rad_s = np.array([joint.speed_rad_s for joint in joints])
         # The eyes' vergence is limited, not that of the commands: a shaft stays behind its command by half its play,
         # and commands that may not diverge by that could not turn the eyes to anything far away.
-        play_rad = sum(0.5 * (pan.servo.dead_band_rad + pan.servo.backlash_rad) for pan in joints[:2])
+        play_rad = sum(pan.servo.half_play_rad for pan in joints[:2])
         self.minimum_vergence_rad = rig.minimum_vergence_rad - play_rad
 
     def nearest(self, angles_rad: Array) -> Array:

@@ -25,7 +25,7 @@ class ServoInverse:
     def __init__(self, rig: Rig, parameters: ServoParameters) -> None:
         tolerance_rad = parameters.hold_tolerance_rad
         servos = [joint.servo for _, joint in rig.joints.items()]
-        described = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
+        described = np.array([servo.half_play_rad for servo in servos])
         # The next step would be no nearer.
         unresolved = _STEP_SHARE * pulse_steps_rad(rig)
         self._tolerance = np.maximum(tolerance_rad + _MOVE_SHARE * described, unresolved)

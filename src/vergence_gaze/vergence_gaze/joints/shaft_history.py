@@ -32,7 +32,7 @@ class ShaftHistory:
 
     def __init__(self, rig: Rig, play_learning: float = 0.0) -> None:
         servos = [joint.servo for _, joint in rig.joints.items()]
-        described = np.array([0.5 * (servo.dead_band_rad + servo.backlash_rad) for servo in servos])
+        described = np.array([servo.half_play_rad for servo in servos])
         self.play = PlayEstimator(described, play_learning)
         self._speed = np.array([servo.speed_rad_s for servo in servos])
         self._latency = np.array([servo.command_latency_s for servo in servos])

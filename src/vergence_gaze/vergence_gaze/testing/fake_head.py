@@ -87,7 +87,7 @@ class FakeHead:
         for name, joint in self.rig.joints.items():
             servo, start = self.servos.get(name, joint.servo), self.start_rad.get(name, 0.0)
             # At rest a shaft lies anywhere in its play.
-            half = 0.5 * (servo.dead_band_rad + servo.backlash_rad)
+            half = servo.half_play_rad
             self._plants[name] = ServoPlant(servo, start + self._random.uniform(-half, half), self.begin_s)
             self._models[name] = ServoPlant(joint.servo, start, self.begin_s)
         self.reported_rad = {name: self.start_rad.get(name, 0.0) for name in JOINT_NAMES}

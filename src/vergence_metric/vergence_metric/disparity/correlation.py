@@ -80,11 +80,16 @@ class Surface:
 
     def subpixel(self, i: int, j: int) -> tuple[float, float]:
         """Return (horizontal, vertical) disparity of the peak at column i, row j by a parabola in each direction."""
-        z = self.zncc
-        rows, columns = z.shape
-        di = parabola(z[j, i - 1], z[j, i], z[j, i + 1]) if 0 < i < columns - 1 else 0.0
-        dj = parabola(z[j - 1, i], z[j, i], z[j + 1, i]) if 0 < j < rows - 1 else 0.0
+        di, dj = peak_offset(self.zncc, i, j)
         return self.first_d + i + di, self.first_v + j + dj
+
+
+def peak_offset(surface: NDArray[np.float32], i: int, j: int) -> tuple[float, float]:
+    """Return the sub-pixel offset (x, y) of the peak at column i, row j by a parabola each way; 0 at a border."""
+    rows, columns = surface.shape
+    across = parabola(surface[j, i - 1], surface[j, i], surface[j, i + 1]) if 0 < i < columns - 1 else 0.0
+    down = parabola(surface[j - 1, i], surface[j, i], surface[j + 1, i]) if 0 < j < rows - 1 else 0.0
+    return across, down
 
 
 def parabola(before: float, at: float, after: float) -> float:

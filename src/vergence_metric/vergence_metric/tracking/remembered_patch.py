@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.disparity.correlation import peak_offset
 from vergence_metric.disparity.fovea_pair import cut
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.tracking.eye_view import EyeView, Pixel
@@ -31,13 +32,11 @@ _PRIOR = 0.05  # similarity that a place at the rim of the search must be better
 class PatchSighting:
     """Where the point is in the image now.
 
-    `similarity` is the correlation of the point's surroundings with the remembered ones (-1 to 1) and `rival` that of
-    the best other place within reach, -1 if there is none.
+    `similarity` is the correlation of the point's surroundings with the remembered ones (-1 to 1).
     """
 
     pixel: Pixel
     similarity: float
-    rival: float
 
 
 class RememberedPatch:
@@ -72,10 +71,8 @@ class RememberedPatch:
             pixel, at_point, _ = _best_near(image, _part(template, sides), sides, place, _REFINED_WITHIN_PX)
             off = math.hypot(pixel[0] - expected[0], pixel[1] - expected[1]) / max(reach_px, 1)
             found.append((similarity + at_point - _PRIOR * off**2, similarity, pixel))
-        found.sort(reverse=True)
-        _, similarity, pixel = found[0]
-        rival = max((other for _, other, _ in found[1:]), default=-1.0)
-        return PatchSighting(pixel, similarity, rival)
+        _, similarity, pixel = max(found)
+        return PatchSighting(pixel, similarity)
 
     def refine(self, image: Image, view: EyeView, pixel: Pixel, reach_px: int) -> tuple[PatchSighting, float]:
         """Return where the point itself is within `reach_px` of a pixel, and its similarity at that pixel.
@@ -85,7 +82,7 @@ class RememberedPatch:
         template = self._warped(self._mapping(view, view.direction(pixel)), _POINT_HALF_PX)
         sides = self._sides(_POINT_HALF_PX, 1)
         place, similarity, here = _best_near(image, _part(template, sides), sides, pixel, reach_px)
-        return PatchSighting(place, similarity, -1.0), here
+        return PatchSighting(place, similarity), here
 
     def _mapping(self, view: EyeView, direction: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the affine map (2, 3) from offsets about the expected pixel now to pixels of the remembered crop."""
@@ -165,19 +162,10 @@ def _best_near(
     area = cut(image, x0, y0, template.shape[1] + 2 * reach, template.shape[0] + 2 * reach)
     surface = _correlation(area, template)
     j, i = divmod(int(surface.argmax()), surface.shape[1])
-    di, dj = _vertex(surface[j], i), _vertex(surface[:, i], j)
+    di, dj = peak_offset(surface, i, j)
     return (x0 + left + i + di, y0 + top + j + dj), float(surface[j, i]), float(surface[reach, reach])
 
 
 def _correlation(area: Image, template: Image) -> NDArray[np.float32]:
     surface = cv2.matchTemplate(area, template, cv2.TM_CCOEFF_NORMED)
     return np.asarray(np.nan_to_num(surface, nan=-1.0, posinf=-1.0, neginf=-1.0), np.float32)
-
-
-def _vertex(line: NDArray[np.float32], k: int) -> float:
-    """Return the offset of a peak's vertex from its sample by a parabola; 0 at the ends."""
-    if not 0 < k < len(line) - 1:
-        return 0.0
-    before, at, after = float(line[k - 1]), float(line[k]), float(line[k + 1])
-    bend = before - 2.0 * at + after
-    return min(max(0.5 * (before - after) / bend, -0.5), 0.5) if bend < -1e-9 else 0.0

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.disparity.correlation import peak_offset
 from vergence_metric.disparity.fovea_pair import cut
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.tracking.eye_view import Pixel
@@ -142,7 +143,7 @@ class TargetAppearance:
             j, i = divmod(int(np.nan_to_num(surface, nan=-1.0).argmax()), surface.shape[1])
             if float(surface[j, i]) > similarity:
                 similarity = float(surface[j, i])
-                di, dj = _peak(surface, i, j)
+                di, dj = peak_offset(surface, i, j)
                 best = (x0[0] + self._half[0] + i + di, x0[1] + self._half[1] + j + dj)
             if template is self._recent and self._recent is self._first:
                 break
@@ -167,16 +168,3 @@ def _zoomed(template: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
     h, w = template.shape
     matrix = np.array([[scale, 0, (1 - scale) * (w - 1) / 2], [0, scale, (1 - scale) * (h - 1) / 2]])
     return np.asarray(cv2.warpAffine(template, matrix, (w, h), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
-
-
-def _peak(surface: NDArray[np.float32], i: int, j: int) -> tuple[float, float]:
-    """Return the sub-pixel offset of a peak by a parabola in each direction."""
-    offsets = []
-    for k, line in ((i, surface[j]), (j, surface[:, i])):
-        if not 0 < k < len(line) - 1:
-            offsets.append(0.0)
-            continue
-        before, at, after = float(line[k - 1]), float(line[k]), float(line[k + 1])
-        bend = before - 2 * at + after
-        offsets.append(min(max(0.5 * (before - after) / bend, -0.5), 0.5) if bend < -1e-9 else 0.0)
-    return offsets[0], offsets[1]
