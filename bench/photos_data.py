@@ -22,6 +22,8 @@ VIEW_PX = 480, 320
 LIT_DIFFERENTLY = "PianoL"
 MOTORCYCLE = "stereo_motorcycle"
 _ETH3D_FOCAL_PX = 542.0
+_NEARER_PX = 1.5  # a disparity larger by this is another surface's
+_FITTED_SHARE = 0.5  # of the motorcycle's columns, the left ones: tools/fit_disparity_model.py may learn from those
 
 
 class NoPhotographsError(ValueError):
@@ -98,23 +100,40 @@ def grey_pair(name: str) -> tuple[Image, Image]:
     return np.asarray(greys[0], np.uint8), np.asarray(greys[1], np.uint8)
 
 
-def motorcycle_points(count: int, seed: int, least_texture: float = 0.0) -> list[KnownPoint]:
+def motorcycle_points(
+    count: int, seed: int, least_texture: float = 0.0, to_fit_on: bool = False
+) -> list[KnownPoint]:
     """Return points drawn evenly from where scikit-image's pair has its disparity, and both images show the place.
 
-    The disparity was measured by structured light. `least_texture` is the least standard deviation of grey levels
-    within 10 px.
+    The disparity was measured by structured light. The points lie in the right half of the left image, those to fit
+    models on in its left half. `least_texture` is the least standard deviation of grey levels within 10 px.
     """
     _, _, disparity = _motorcycle()
-    grey = grey_pair(MOTORCYCLE)[0]
+    shown, grey = _shown_in_both(disparity), grey_pair(MOTORCYCLE)[0]
     height, width = disparity.shape
     rng = np.random.default_rng(seed)
+    middle = round(_FITTED_SHARE * width)
+    first, last = (20, middle) if to_fit_on else (middle, width - 20)
     points: list[KnownPoint] = []
     while len(points) < count:
-        x, y = int(rng.integers(20, width - 20)), int(rng.integers(20, height - 20))
+        x, y = int(rng.integers(first, last)), int(rng.integers(20, height - 20))
         value, texture = float(disparity[y, x]), float(grey[y - 10 : y + 11, x - 10 : x + 11].std())
-        if math.isfinite(value) and x - value > 20 and texture >= least_texture:
+        if shown[y, x] and x - value > 20 and texture >= least_texture:
             points.append(KnownPoint(MOTORCYCLE, x, y, value, exact=True))
     return points
+
+
+def _shown_in_both(disparity: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+    """Return where (h, w) the disparity is known and nothing nearer hides the place from the right eye."""
+    rows, columns = np.nonzero(np.isfinite(disparity) & (np.arange(disparity.shape[1]) >= disparity))
+    known = disparity[rows, columns]
+    lands = columns - known
+    nearest = np.full((disparity.shape[0], disparity.shape[1] + 1), -np.inf, np.float32)
+    for column in (np.floor(lands), np.ceil(lands)):
+        np.maximum.at(nearest, (rows, column.astype(int)), known)
+    shown = np.zeros(disparity.shape, np.bool_)
+    shown[rows, columns] = nearest[rows, np.rint(lands).astype(int)] - known <= _NEARER_PX
+    return shown
 
 
 @lru_cache(maxsize=1)

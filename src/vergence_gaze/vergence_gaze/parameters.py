@@ -218,6 +218,20 @@ class TargetParameters(Parameters):
         maximum=0.2,
         formerly="point_sigma_rad",
     )
+    point_tolerance_rad: float = parameter(
+        0.0175,
+        "difference in direction or vergence up to which what is seen lies at a point that was requested in space",
+        unit="rad",
+        minimum=0.001,
+        maximum=0.5,
+    )
+    point_dwell_s: float = parameter(
+        0.6,
+        "time at rest on a point requested in space after which it is empty if nothing was seen there",
+        unit="s",
+        minimum=0.1,
+        maximum=60,
+    )
     disagreement_rad: float = parameter(
         0.02,
         "difference of two estimators' vergence, beyond the object's own depth, above which the eyes hold still",

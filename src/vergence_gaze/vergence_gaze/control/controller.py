@@ -15,6 +15,7 @@ from vergence_gaze.estimation.observations import JointResolution, Observation, 
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
+from vergence_gaze.goals.requested_point import RequestedPoint
 from vergence_gaze.goals.goal_resolution import RequestedClass, RequestedPose, resolve_goal
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.limits import CommandLimits
@@ -122,9 +123,11 @@ class GazeController:
             if seen:
                 xy = goal.left_xy if goal.left_eye else goal.right_xy
                 self._track_request = TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy)
-            self._perception.tracking.request_target(
-                now_s, request.stamp_s, request.angles_rad, request.covariance, goal_id if seen else 0
-            )
+            start = now_s, request.stamp_s, request.angles_rad, request.covariance
+            if goal.kind is GoalKind.POINT:
+                self._perception.tracking.request_point(*start, goal_id)
+            else:
+                self._perception.tracking.request_target(*start, goal_id if seen else 0)
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
 
@@ -213,7 +216,10 @@ class GazeController:
             return self._pose
         if self._verges_on_sight and not self._perception.tracking.filter.initialised:
             self._verge_on_view(now_s)
-        phase = self._phases.update(self._situation(self._control_input(now_s, command)))
+        situation = self._situation(self._control_input(now_s, command))
+        phase = self._phases.update(situation)
+        if self._perception.tracking.point is not None:
+            self._look_at_point(self._perception.tracking.point, situation)
         if phase is Phase.SEARCH:
             place = self._searcher.next_pose(now_s, self._perception.history.shaft_rad, self._limits.speed_rad_s)
             return np.where(self._driven, place, np.nan)
@@ -227,6 +233,14 @@ class GazeController:
             self._phases.enter(Phase.VERGE, "estimators of the target's vergence disagree: holding still", now_s)
             return _UNKNOWN
         return self._law.compute_command(self._control_input(now_s, command))
+
+    def _look_at_point(self, point: RequestedPoint, s: Situation) -> None:
+        history, exposure_s = self._perception.history, self._perception.exposure_s
+        seen = history.covers(exposure_s) and self._perception.tracking.eyes_were_still(exposure_s, 0.0)
+        joints_rad = history.shaft_at(exposure_s) if seen else _UNKNOWN
+        resting = s.eyes_still and s.residual_rad <= self._p.saccade.threshold_rad
+        request = point.request(resting, s.now_s, exposure_s if seen else math.nan, joints_rad)
+        self._track_request = request or self._track_request
 
     def _verge_on_view(self, now_s: float) -> None:
         self._phases.enter(Phase.VERGE, "no goal: verging on what the left eye looks at", now_s)
@@ -295,6 +309,8 @@ class GazeController:
             disagreement=self._perception.tracking.disagreement,
             by_class=self._perception.tracking.class_name is not None,
             pose_reached=pose_reached,
+            ambiguity=self._perception.tracking.ambiguity,
+            at_point=point.reached(now_s) if (point := self._perception.tracking.point) else "",
         )
         if self._goals.update(progress, self._p) is Result.VERGED and pose_reached:
             self._hold("the joints are at the requested angles", now_s)

@@ -50,7 +50,7 @@ class Perception:
         self._rig, self._described_steps_rad = rig, pulse_steps_rad(rig)
         self.history = ShaftHistory(rig)
         self.image_s = -math.inf
-        self.pair_s = math.nan
+        self.pair_s = self.exposure_s = math.nan
         self.contrast: ContrastSample | None = None
         self._predicted_error, self._predicted_s = _NO_PREDICTION, math.nan
         self._set_servos(rig)
@@ -97,6 +97,7 @@ class Perception:
             return
         if not isinstance(observation, PointSighting):
             self.image_s = now_s
+            self.exposure_s = observation.stamp_s
         if isinstance(observation, EdgeContrast):
             self._update_contrast(observation, now_s, law, verging)
             return
@@ -126,6 +127,8 @@ class Perception:
 
         While no results from images arrive at all, the target is not lost: a starved graph is late, not blind.
         """
+        if self.tracking.point is not None:
+            return 0.0  # a point is looked at by the joints, whatever lies there
         seen_s = self.tracking.seen_s
         if not math.isfinite(seen_s):
             return math.inf
@@ -221,8 +224,10 @@ class Perception:
             measured_error = Gaussian(vergence_error, float(estimate.sigmas_rad[1]))
             probability = probability_beyond_limit(self._predicted_error, measured_error, limit)
             probability += sum(Gaussian(float(off[i]), float(sigmas[i])).probability_beyond(limit) for i in judged)
-        identified = self.tracking.source != "fovea" or self.tracking.unidentified_for_s(now_s) < _IDENTIFIED_WITHIN_S
-        self.judge.update_pair(stamp_s, now_s, error, steady, verging, probability, direction_error, identified)
+        objection = self.tracking.ambiguity
+        if self.tracking.source == "fovea" and self.tracking.unidentified_for_s(now_s) >= _IDENTIFIED_WITHIN_S:
+            objection = "an object at the target's depth lies at the fovea, but the target was not seen for long"
+        self.judge.update_pair(stamp_s, now_s, error, steady, verging, probability, direction_error, objection)
 
     def _on_target(self, now_s: float) -> bool:
         """Return whether the eyes by now are on the predicted target, with enough certainty."""

@@ -22,7 +22,7 @@ class PairEvidence:
     steady: bool
     resting: bool
     error_probability: float
-    identified: bool
+    objection: str
 
 
 class VergenceJudge:
@@ -107,7 +107,7 @@ class VergenceJudge:
         resting: bool,
         error_probability: float = 1.0,
         direction_error_rad: float = 0.0,
-        identified: bool = True,
+        objection: str = "",
     ) -> bool:
         """Judge one pair in which the target was measured; returns `verged`.
 
@@ -120,7 +120,7 @@ class VergenceJudge:
             resting: whether the eyes were still enough in that pair.
             error_probability: of an error beyond the limit, given the prediction before the pair and the pair itself.
             direction_error_rad: the largest error of a gaze direction in that pair.
-            identified: whether the target itself was measured lately, not only something at its depth.
+            objection: why what was measured may not be the target; "" if nothing speaks against it.
         """
         if not stamp_s >= self._last_pair_s or (stamp_s == self._last_pair_s and self._pair is None):
             return self.verged
@@ -129,7 +129,7 @@ class VergenceJudge:
         elif self.verged and self._bad > self._bad_before:
             return self.verged  # the pair is counted as bad already
         self._pair = PairEvidence(
-            stamp_s, vergence_error_rad, direction_error_rad, steady, resting, error_probability, identified
+            stamp_s, vergence_error_rad, direction_error_rad, steady, resting, error_probability, objection
         )
         if self.verged:
             self._stay(self._pair, now_s)
@@ -155,8 +155,8 @@ class VergenceJudge:
             self.verged, self.since_s, self._good = False, math.nan, 0
 
     def _within(self, pair: PairEvidence, now_s: float, limits_rad: tuple[float, float], contrast_limit: float) -> bool:
-        if not pair.identified:
-            self.reason = "an object at the target's depth lies at the fovea, but the target was not seen for long"
+        if pair.objection:
+            self.reason = pair.objection
             return False
         errors_rad = {"vergence": pair.vergence_error_rad, "direction": pair.direction_error_rad}
         for (kind, error_rad), limit_rad in zip(errors_rad.items(), limits_rad, strict=True):

@@ -42,7 +42,9 @@ class FoveaDisparity:
 class TrackSighting:
     """The target of the class-free tracker: normalised left coordinates and disparity.
 
-    `disparity_rad` is NaN while the right eye does not see it; `usable` is False while locking or lost.
+    `disparity_rad` is NaN while the right eye does not see it; `usable` is False while locking or lost. While
+    `ambiguous`, several distances fit, and the disparity is only the likeliest one's; `candidates` are the disparities
+    [rad] that a requested target may have, each with its weight.
     """
 
     stamp_s: float
@@ -57,6 +59,8 @@ class TrackSighting:
     usable: bool
     reason: str = ""
     goal_id: int = 0
+    ambiguous: bool = False
+    candidates: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,11 @@ from vergence_gaze.estimation.kalman import Measurement
 from vergence_gaze.estimation.locks import BoxLock, TrackLock
 from vergence_gaze.estimation.observations import BoxSighting, FoveaDisparity, PointSighting, TrackSighting
 from vergence_gaze.estimation.target_estimator import TargetEstimator
+from vergence_gaze.goals.requested_point import RequestedPoint
 from vergence_gaze.joints.joint_moves import JointMoves
 from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_gaze.parameters import GazeParameters
+from vergence_rig.geometry import point_at
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
@@ -32,6 +34,8 @@ Array = npt.NDArray[np.float64]
 _FRESH_S = 0.15
 _BOX_LATE_S = 0.4
 _CLASS_CONFIRMED_S = 1.0
+_NAMED_DISTANCES = 4
+_FARTHEST_RAD = 0.0065  # vergence of 10 m with a baseline of 65 mm
 _RESTED_S = 0.05  # an image shows where a move ended once the joints have rested this long
 
 
@@ -60,6 +64,9 @@ class TargetTracking(TargetEstimator):
         self._fovea_was_inconsistent = False
         self._goal_id = 0
         self._tracker_answers = False
+        self.point: RequestedPoint | None = None
+        self.ambiguity = ""
+        """Which distances the target may have, while several fit."""
         self._history.play.restart()
 
     def request_target(
@@ -75,6 +82,12 @@ class TargetTracking(TargetEstimator):
         self.filter.initialise(stamp_s, angles_rad, covariance)
         self._requested_s = now_s
         self.seen_s = now_s
+
+    def request_point(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array, goal_id: int) -> None:
+        """Start with a point in space, as `request_target`: only what the tracker sees there updates it."""
+        self.request_target(now_s, stamp_s, angles_rad, covariance, goal_id)
+        joints_rad = self.filter.at(stamp_s).joints_rad
+        self.point = RequestedPoint(goal_id, joints_rad, self._p.target, self._p.control.no_images_s)
 
     def request_class(self, now_s: float, class_name: str) -> None:
         """Start with any target of a detected class ("": of any class), wherever it is."""
@@ -100,15 +113,24 @@ class TargetTracking(TargetEstimator):
 
     def update_track(self, sighting: TrackSighting, now_s: float) -> bool:
         """Update by a track; returns True if it was the target's and was accepted."""
-        self._tracker_answers |= self._goal_id > 0 and sighting.goal_id == self._goal_id
+        answers = self._goal_id > 0 and sighting.goal_id == self._goal_id
+        if answers:
+            self._tracker_answers = True
+            if self.point is not None:
+                self.point.on_answer()
         if not sighting.usable or not self.eyes_were_still(sighting.stamp_s, sighting.skew_s):
             return False
         sigma = self._exposures.sigma(sighting.stamp_s, sighting.skew_s, self._p.target.direction_sigma_rad)
         disparity_sigma = positive_sigma(sighting.sigma_rad, self._p.target.direction_sigma_rad)
         measurement, seen = directions.track(self._history, sighting, sigma, disparity_sigma)
+        if answers:
+            self.ambiguity = self._ambiguity_of(sighting) if sighting.ambiguous else ""
         self.inflate_for_joint_motion(sighting.stamp_s)
         self._track.add(sighting.stamp_s, sighting.track_id, seen)
         if not self._is_target_track(sighting, seen):
+            return False
+        if self.point is not None and (objection := self.point.objection(seen)):
+            self.note = f"nothing is seen at the requested point: {objection}"
             return False
         if math.isfinite(seen[1]):
             vergence = float(seen[1] - seen[0])
@@ -121,6 +143,19 @@ class TargetTracking(TargetEstimator):
                 measurement, seen = directions.track(self._history, there, sigma, disparity_sigma)
         measurement, seen = _shifted(measurement, seen, self._track.offset)
         return self.update(measurement, seen, sighting.skew_s, now_s, "track")
+
+    def _ambiguity_of(self, sighting: TrackSighting) -> str:
+        """Return the distances that fit, in words, the likeliest first."""
+        distances_m = []
+        for disparity_rad, _ in sighting.candidates[:_NAMED_DISTANCES]:
+            there = replace(sighting, disparity_rad=disparity_rad)
+            _, (left_pan, right_pan, tilt) = directions.track(self._history, there, 0.0, 0.0)
+            if right_pan - left_pan > _FARTHEST_RAD:
+                point_m = point_at(0.5 * (left_pan + right_pan), right_pan - left_pan, tilt, self._baseline_m)
+                distances_m.append(f"{np.linalg.norm(point_m):.2f} m")
+            else:
+                distances_m.append("far away")
+        return f"the target may be at one of several distances: {', '.join(distances_m)}"
 
     def _observe_play(self, sighting: TrackSighting, seen_rad: Array) -> None:
         """Learn the joints' play from a target at rest that is seen by eyes at rest."""
@@ -154,7 +189,7 @@ class TargetTracking(TargetEstimator):
             self._consistency.update_fovea(stamp_s, vergence)
         self._depths.update_fovea(stamp_s, vergence)
         self._distractors.update_fovea(stamp_s, vergence, joints)
-        if self._tracker_answers:
+        if self._tracker_answers or self.point is not None:
             return False  # the fovea sees whatever lies there, the tracker what was asked for
         if self._consistency.track_is_fresh(stamp_s, _FRESH_S) and not self._depths.track_inconsistent:
             return False  # the tracker measures the target itself, the fovea only whatever lies there
@@ -181,7 +216,7 @@ class TargetTracking(TargetEstimator):
     def update_box(self, sighting: BoxSighting, now_s: float) -> bool:
         """Update by a detection; returns True if it was the target, by its class or its place, and was accepted."""
         by_class = self.class_name is not None
-        if self._tracker_answers or not sighting.usable or self.class_name not in (None, "", sighting.class_name):
+        if self._tracker_answers or self.point is not None or not sighting.usable or self.class_name not in (None, "", sighting.class_name):
             return False
         if not (by_class or (sighting.whole and self.filter.initialised)):
             return False
@@ -267,7 +302,7 @@ class TargetTracking(TargetEstimator):
         return self._exposures.were_still(stamp_s, skew_s, target)
 
     def _is_target_track(self, sighting: TrackSighting, seen_rad: Array) -> bool:
-        if self.follows_stream:
+        if self.follows_stream or (self.point is not None and not self._tracker_answers):
             return False
         if self._tracker_answers:
             self.note = self._track.adopt_requested(sighting.track_id, sighting.goal_id == self._goal_id)

@@ -29,6 +29,8 @@ class Result(enum.IntEnum):
     CANCELLED = 7
     TIMED_OUT = 8
     INVALID = 9
+    AT_POINT = 10
+    AMBIGUOUS = 11
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,15 @@ from vergence_gaze.phases import Phase
 _LIMITED_S = 0.5
 _LOST_S = 2.5
 _DISAGREED_S = 1.0
+_AMBIGUOUS_S = 3.0
 
 
 @dataclass(frozen=True)
 class Progress:
     """The state that decides a goal, in one cycle. `pose_reached` is None unless the goal is a pose.
 
-    `verged_reason` says why the eyes are verged or not yet, `tracking_note` why the last measurement was rejected.
+    `at_point` says why an empty point counts as looked at, "" while it does not; `ambiguity` which
+    distances fit, "" while only one does. `verged_reason` says why the eyes are verged or not yet, `tracking_note` why the last measurement was rejected.
     """
 
     now_s: float
@@ -31,6 +33,8 @@ class Progress:
     disagreement: bool
     by_class: bool
     pose_reached: bool | None
+    at_point: str = ""
+    ambiguity: str = ""
 
 
 class GoalMonitor:
@@ -41,7 +45,7 @@ class GoalMonitor:
         self._outcomes: list[Outcome] = []
         self._goal_id: int | None = None
         self._since_s = self._limit_s = math.nan
-        self._limited_since_s = self._disagreed_since_s = math.nan
+        self._limited_since_s = self._disagreed_since_s = self._ambiguous_since_s = math.nan
 
     @property
     def goal_id(self) -> int | None:
@@ -60,7 +64,7 @@ class GoalMonitor:
         """Make a goal the active one."""
         self._goal_id, self._since_s = goal_id, now_s
         self._limit_s = goal.time_limit_s or parameters.control.time_limit_s
-        self._limited_since_s = self._disagreed_since_s = math.nan
+        self._limited_since_s = self._disagreed_since_s = self._ambiguous_since_s = math.nan
 
     def end(self, result: Result, reason: str, now_s: float) -> None:
         """End the active goal, if there is one."""
@@ -79,6 +83,7 @@ class GoalMonitor:
             return None
         self._limited_since_s = _since(self._limited_since_s, p.beyond_limits, p.now_s)
         self._disagreed_since_s = _since(self._disagreed_since_s, p.disagreement, p.now_s)
+        self._ambiguous_since_s = _since(self._ambiguous_since_s, bool(p.ambiguity), p.now_s)
         ending = self._pose_ending(p) if p.pose_reached is not None else self._target_ending(p, parameters)
         if ending is None:
             return None
@@ -95,6 +100,8 @@ class GoalMonitor:
     def _target_ending(self, p: Progress, parameters: GazeParameters) -> tuple[Result, str] | None:
         if p.verged:
             return Result.VERGED, p.verged_reason
+        if p.at_point:
+            return Result.AT_POINT, p.at_point
         if p.now_s - self._limited_since_s > _LIMITED_S:
             return Result.LIMITS, "the target is beyond the joints' limits"
         if p.now_s - self._disagreed_since_s > _DISAGREED_S:
@@ -102,9 +109,13 @@ class GoalMonitor:
                 Result.DISAGREEMENT,
                 "estimators of the target's vergence disagree by more than the object's depth explains",
             )
+        if p.now_s - self._ambiguous_since_s > _AMBIGUOUS_S:
+            return Result.AMBIGUOUS, p.ambiguity
         if p.now_s - max(p.image_s, self._since_s) > parameters.control.no_images_s:
             return Result.NO_IMAGES, "no results from the images arrive"
         if p.now_s - self._since_s > self._limit_s:
+            if p.ambiguity:
+                return Result.AMBIGUOUS, p.ambiguity
             lost = p.phase in (Phase.LOST, Phase.SEARCH)
             return (Result.LOST if lost else Result.TIMED_OUT), p.tracking_note or p.verged_reason
         if p.phase is Phase.SEARCH and not p.by_class and p.in_phase_s > _LOST_S:

@@ -61,9 +61,10 @@ def fovea_disparity(message: VergenceError, focal_px: float) -> FoveaDisparity:
 
 def track_sighting(message: TargetTrack, left_camera: CameraModel) -> TrackSighting:
     """Return the track in normalised coordinates."""
-    found = message.status in (TargetTrack.STATUS_OK, TargetTrack.STATUS_OCCLUDED)
+    both = message.status in (TargetTrack.STATUS_OK, TargetTrack.STATUS_AMBIGUOUS)
+    found = both or message.status == TargetTrack.STATUS_OCCLUDED
     x, y = left_camera.undistort([[message.left_x_px, message.left_y_px]])[0] if found else (math.nan, math.nan)
-    both = message.status == TargetTrack.STATUS_OK
+    candidates = zip(message.candidate_disparity_px, message.candidate_weight, strict=True)
     return TrackSighting(
         stamp_s=to_seconds(message.header.stamp),
         skew_s=message.pair_skew_s,
@@ -77,6 +78,8 @@ def track_sighting(message: TargetTrack, left_camera: CameraModel) -> TrackSight
         usable=bool(found and math.isfinite(x) and math.isfinite(y)),
         reason=message.reason,
         goal_id=message.goal_id,
+        ambiguous=message.status == TargetTrack.STATUS_AMBIGUOUS,
+        candidates=tuple((math.atan(x) - math.atan(x - px / left_camera.fx_px), weight) for px, weight in candidates),
     )
 
 

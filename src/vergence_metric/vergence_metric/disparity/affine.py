@@ -21,12 +21,13 @@ from vergence_metric.disparity.shared_search import LocalDisparity
 _BLUR_PX = 0.9  # linear interpolation is all but exact on what this leaves
 _REMAP_STEPS = 32  # per pixel
 _ITERATIONS = 12
-_CONVERGED_PX = 0.003
+_CONVERGED_PX = 0.01
 _LARGEST_STEP_PX = 3.0
 _LARGEST_SHEAR = 0.4
 _LARGEST_LEAP_PX = 8.0
 _LEAST_GAIN = 0.2
 _LEAST_VARIANCE = 1e-3  # grey levels squared
+_LEAST_SUPPORT = 0.05  # share of a window's weight that must lie on the surface
 _SHEAR_FROM_PX = 8.0
 _REACH_PX = 24  # that a warped window may reach beyond its own size
 _FLOOR_PX = 0.01  # interpolation, and what no residual shows
@@ -42,13 +43,22 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted warp: disparity at the point [px], its deviation [px], what is left over [grey levels], linear part."""
+    """A fitted warp: disparity at the point [px], its deviation [px], what is left over [grey levels], linear part.
+
+    `texture` is the deviation of the left image's grey levels under the window's weights.
+    """
 
     horizontal_px: float
     vertical_px: float
     sigma_px: float
     residual: float
     affine: Matrix
+    texture: float
+
+    @property
+    def correlation(self) -> float:
+        """Correlation of the left image with the warped right one under the window's weights."""
+        return math.sqrt(max(1.0 - (self.residual / max(self.texture, 1e-3)) ** 2, 0.0))
 
 
 def measure_affine(pair: FoveaPair, match: Match, parameters: DisparityParameters) -> LocalDisparity | None:
@@ -58,18 +68,28 @@ def measure_affine(pair: FoveaPair, match: Match, parameters: DisparityParameter
 
 
 def grow(
-    pair: FoveaPair, horizontal_px: float, vertical_px: float, window_px: float, parameters: DisparityParameters
+    pair: FoveaPair,
+    horizontal_px: float,
+    vertical_px: float,
+    window_px: float,
+    parameters: DisparityParameters,
+    slopes: tuple[float, float] = (0.0, 0.0),
+    support: Strip | None = None,
 ) -> Fit | None:
-    """Fit in the window that decided, then in larger ones while they see the same surface; None if nothing fits."""
+    """Fit in the window that decided, then in larger ones while they see the same surface; None if nothing fits.
+
+    `slopes` are the disparity's changes per pixel across and down, where they are known. `support` weights the pixels
+    of the left image from 0 to 1, such as 0 for those of another surface.
+    """
     reach = radius_of(parameters.windows_px[-1]) + _REACH_PX
     x, blurred = pair.point_px[0], []
     for strip, middle in zip(pair.full, (x, x - horizontal_px), strict=True):
         near = strip.columns(round(middle) - reach, round(middle) + reach + 1)
         blurred.append(Strip(cv2.GaussianBlur(near.grey, (0, 0), _BLUR_PX), near.x0, near.y0))
-    warp = np.array([[1.0, 0.0, -horizontal_px], [0.0, 1.0, -vertical_px]])
+    warp = np.array([[1.0 - slopes[0], -slopes[1], -horizontal_px], [0.0, 1.0, -vertical_px]])
     best: Fit | None = None
     for sigma in [w for w in parameters.windows_px if w >= window_px]:
-        fit = fit_affine(blurred[0], blurred[1], pair.point_px, sigma, warp)
+        fit = fit_affine(blurred[0], blurred[1], pair.point_px, sigma, warp, support)
         # The same surface leaves the same residual; another depth in view raises it.
         if (
             fit is None
@@ -84,7 +104,14 @@ def grow(
     return best
 
 
-def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: float, warp: Matrix) -> Fit | None:
+def fit_affine(
+    left: Strip,
+    right: Strip,
+    point_px: tuple[float, float],
+    sigma: float,
+    warp: Matrix,
+    support: Strip | None = None,
+) -> Fit | None:
     """Fit the warp from offsets about the point in the left image to offsets in the right one.
 
     Args:
@@ -93,12 +120,13 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
         point_px: (x, y) of the point in the left image.
         sigma: of the Gaussian window [px].
         warp: (2, 3), where to start: linear part and translation (-disparity).
+        support: weights of the left image's pixels, 0 to 1, as large as the window at least; None for all alike.
 
     Returns:
         The fit, None where it does not converge or texture does not determine it.
 
     """
-    window = _linearised(left, point_px, sigma)
+    window = _linearised(left, point_px, sigma, support)
     if window is None:
         return None
     found = np.vstack([warp, [0.0, 0.0, 1.0]])
@@ -110,7 +138,7 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
         if not _LEAST_GAIN <= gain <= 1.0 / _LEAST_GAIN:
             return None
         step = solution[:6] / gain
-        found = found @ np.linalg.inv(_increment(step, sigma))
+        found = found @ _undone(step, sigma)
         if np.abs(found[:2, :2] - np.eye(2)).max() > _LARGEST_SHEAR or np.abs(step[[0, 3]]).max() > _LARGEST_LEAP_PX:
             return None
         if np.abs(step).max() < _CONVERGED_PX:
@@ -118,7 +146,9 @@ def fit_affine(left: Strip, right: Strip, point_px: tuple[float, float], sigma: 
     residual = seen - np.einsum("i,in->n", solution, window.design)
     variance = float(np.square(window.roots * residual).sum())
     sigma_px = math.hypot(window.deviation(residual) / gain, _FLOOR_PX)
-    return Fit(-float(found[0, 2]), -float(found[1, 2]), sigma_px, math.sqrt(variance), found[:2, :2].copy())
+    return Fit(
+        -float(found[0, 2]), -float(found[1, 2]), sigma_px, math.sqrt(variance), found[:2, :2].copy(), window.texture
+    )
 
 
 @dataclass(frozen=True)
@@ -127,7 +157,7 @@ class _Window:
 
     Of its N = n x n samples, `stride_px` apart, `offsets` are u (1, n) and v (n, 1) from the point [px], `gradients`
     across and down (n, n), `roots` (N) those of the weights, which sum to 1, `weighted` is their product with the
-    design and `inverse` (8, 8) that of the normal matrix.
+    design and `inverse` (8, 8) that of the normal matrix; `texture` is the weighted deviation of the grey levels.
     """
 
     stride_px: int
@@ -137,6 +167,7 @@ class _Window:
     design: Matrix
     weighted: Matrix
     inverse: Matrix
+    texture: float
 
     def seen(self, right: Strip, point_px: tuple[float, float], warp: Matrix, gain: float) -> Matrix:
         """Return what the right image shows at the warped offsets (N)."""
@@ -162,7 +193,9 @@ class _Window:
         return math.sqrt(float((blocks**2).sum())) / side
 
 
-def _linearised(left: Strip, point_px: tuple[float, float], sigma: float) -> _Window | None:
+def _linearised(
+    left: Strip, point_px: tuple[float, float], sigma: float, support: Strip | None = None
+) -> _Window | None:
     """Return the window about the point as a linear model, None where it holds too little texture."""
     stride = 2 if sigma >= _SPARSE_FROM_PX else 1
     offsets = np.arange(-(radius_of(sigma) // stride) * stride, radius_of(sigma) + 1, stride)
@@ -179,6 +212,15 @@ def _linearised(left: Strip, point_px: tuple[float, float], sigma: float) -> _Wi
     v = (offsets + (y + left.y0 - point_px[1]))[:, None]
     across, down = np.exp(-0.5 * (u / sigma) ** 2), np.exp(-0.5 * (v / sigma) ** 2)
     roots = np.sqrt(down / down.sum()) * np.sqrt(across / across.sum())
+    share = 1.0
+    if support is not None:
+        rows, columns = (round(c + first - o) for c, o in ((y + left.y0, support.y0), (x + left.x0, support.x0)))
+        span = last - first + 1
+        roots = roots * np.sqrt(support.grey[rows : rows + span : stride, columns : columns + span : stride])
+        share = float(np.square(roots).sum())
+        if share < _LEAST_SUPPORT:
+            return None
+        roots /= math.sqrt(share)
     centred = patch - float((roots * roots * patch).sum())
     # Offsets are scaled by the window, so that the rows of the design are of one size.
     parts = [gx, gx * (u / sigma), gx * (v / sigma), gy, gy * (u / sigma), gy * (v / sigma), centred]
@@ -192,28 +234,26 @@ def _linearised(left: Strip, point_px: tuple[float, float], sigma: float) -> _Wi
     if float(normal[6, 6]) < _LEAST_VARIANCE:
         return None
     try:
-        inverse = np.linalg.inv(normal + np.diag(_damping(sigma)))
+        inverse = np.linalg.inv(normal + np.diag(_damping(sigma, share)))
     except np.linalg.LinAlgError:
         return None
-    return _Window(stride, (u, v), (gx, gy), roots.ravel(), design, weighted, inverse)
+    texture = math.sqrt(float(normal[6, 6]))
+    return _Window(stride, (u, v), (gx, gy), roots.ravel(), design, weighted, inverse, texture)
 
 
-def _damping(sigma: float) -> Matrix:
+def _damping(sigma: float, share: float) -> Matrix:
     """Return the damping of the steps (8) where texture is weak, as if by priors at a noise of 2 levels."""
     damping = np.zeros(8)
-    noise = 4.0 / (2 * math.pi * sigma**2)
+    noise = 4.0 / (2 * math.pi * sigma**2 * share)
     # A small window barely sees roll and slant, and fitting them costs it its precision: there they stay as they are.
     damping[[1, 2, 4, 5]] = noise / (_PRIOR_SHEAR * sigma) ** 2 if sigma >= _SHEAR_FROM_PX else 1e9
     damping[3] = noise / _PRIOR_VERTICAL_PX**2
     return damping
 
 
-def _increment(step: Matrix, sigma: float) -> Matrix:
-    """Return the warp (3, 3) of an increment (6): translation across, two shears, translation down, two shears."""
-    return np.array(
-        [
-            [1 + step[1] / sigma, step[2] / sigma, step[0]],
-            [step[4] / sigma, 1 + step[5] / sigma, step[3]],
-            [0.0, 0.0, 1.0],
-        ]
-    )
+def _undone(step: Matrix, sigma: float) -> Matrix:
+    """Return the inverse warp (3, 3) of an increment (6): translation across, two shears, the same three down."""
+    a, b, c, d = 1 + step[1] / sigma, step[2] / sigma, step[4] / sigma, 1 + step[5] / sigma
+    scale = 1.0 / (a * d - b * c)
+    a, b, c, d = scale * d, -scale * b, -scale * c, scale * a
+    return np.array([[a, b, -a * step[0] - b * step[3]], [c, d, -c * step[0] - d * step[3]], [0.0, 0.0, 1.0]])

@@ -9,9 +9,11 @@ from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.phase import measure_phase
 from vergence_metric.disparity.protocol import DisparityEstimator
 from vergence_metric.disparity.registry import estimator_builder, register_estimator
+from vergence_metric.disparity.semi_global import SemiGlobalEstimator
 from vergence_metric.disparity.shared_search import shared_search
 from vergence_metric.disparity.zncc import measure_zncc
 
+register_estimator(SemiGlobalEstimator.name, SemiGlobalEstimator)
 register_estimator("affine", shared_search(measure_affine))
 register_estimator("zncc", shared_search(measure_zncc))
 register_estimator("edge_shift", shared_search(measure_edge_shift))

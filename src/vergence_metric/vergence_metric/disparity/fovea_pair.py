@@ -18,6 +18,9 @@ def cut(image: Image, x0: int, y0: int, width: int, height: int) -> Image:
     inside = image[max(y0, 0) : max(min(y0 + height, h), 0), max(x0, 0) : max(min(x0 + width, w), 0)]
     if inside.shape == (height, width):
         return inside
+    if inside.size:
+        top, left, bottom, right = max(-y0, 0), max(-x0, 0), max(y0 + height - h, 0), max(x0 + width - w, 0)
+        return np.asarray(cv2.copyMakeBorder(inside, top, bottom, left, right, cv2.BORDER_REPLICATE))
     xs = np.clip(np.arange(x0, x0 + width), 0, w - 1)
     ys = np.clip(np.arange(y0, y0 + height), 0, h - 1)
     return image[np.ix_(ys, xs)]

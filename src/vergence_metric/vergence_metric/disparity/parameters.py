@@ -13,7 +13,7 @@ class DisparityParameters(Parameters):
     """How the signed disparity at a point of the left image is found."""
 
     estimator: str = parameter(
-        "affine", "name of the disparity estimator", choices=estimator_names, formerly="disparity_estimator"
+        "semi_global", "name of the disparity estimator", choices=estimator_names, formerly="disparity_estimator"
     )
     depth_policy: str = parameter(
         "center",
@@ -45,8 +45,8 @@ class DisparityParameters(Parameters):
     )
     windows_px: tuple[float, ...] = parameter(
         (5.0, 10.0, 20.0),
-        "standard deviations of the Gaussian matching windows, ascending: the smallest with an unambiguous match is "
-        "used",
+        "standard deviations of the Gaussian matching windows, ascending: semi_global compares candidates in all, "
+        "other estimators use the smallest with an unambiguous match",
         unit="px",
         minimum=2.0,
         maximum=60.0,
@@ -62,14 +62,16 @@ class DisparityParameters(Parameters):
     )
     uniqueness: float = parameter(
         0.85,
-        "a match is ambiguous if a second correlation peak reaches this share of the best one",
+        "a match is ambiguous if a second correlation peak reaches this share of the best one; without effect on "
+        "semi_global",
         minimum=0.5,
         maximum=1.0,
         formerly="disparity_uniqueness",
     )
     left_right_px: float = parameter(
         1.5,
-        "left-right consistency: largest distance at which matching back from the right image returns",
+        "left-right consistency: largest distance at which matching back from the right image returns; without effect "
+        "on semi_global",
         unit="px",
         minimum=0.5,
         maximum=8.0,

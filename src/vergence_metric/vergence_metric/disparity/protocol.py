@@ -27,15 +27,25 @@ class DisparityStatus(IntEnum):
 
 
 @dataclass(frozen=True)
+class Candidate:
+    """A disparity [px] that a point may have, its likelihood (0 to 1) and where it was found."""
+
+    disparity_px: float
+    likelihood: float
+    found_by: str
+
+
+@dataclass(frozen=True)
 class Disparity:
     """The disparity of one point of the left image.
 
     `horizontal_px` is x_left - x_right, `vertical_px` is y_left - y_right of the world point seen at `point_px` (x, y)
     of the left image; positive horizontal means nearer than where the axes cross. `sigma_px` is the standard deviation
-    of the horizontal one by image noise and texture; that of `affine` also by what its model misses. `confidence` is
-    the share of estimates with the same evidence that lie within 2 px of the truth (see `evidence.py`). Where `status`
-    is not OK the figures are NaN, except that an OUT_OF_RANGE or AMBIGUOUS one keeps its best guess for the log; its
-    confidence is at most 0.5.
+    of the horizontal one by image noise and texture; that of `affine` also by what its model misses, that of
+    `semi_global` as fitted to real pairs. `confidence` is the share of estimates with the same evidence that lie within
+    2 px of the truth (see `evidence.py`, `semi_global_model.py`). Where `status` is not OK the figures are NaN, except
+    that an estimate that was measured and rejected keeps its best guess; its confidence is at most 0.5. `candidates`
+    are the disparities that the point may have, likeliest first, where the estimator ranks them.
     """
 
     horizontal_px: float
@@ -46,6 +56,7 @@ class Disparity:
     reason: str
     estimator: str
     point_px: Point
+    candidates: tuple[Candidate, ...] = ()
 
     @property
     def ok(self) -> bool:

@@ -37,6 +37,8 @@ def track_message(
         confidence=track.confidence,
         status=int(track.status),
         reason=track.reason,
+        candidate_disparity_px=[disparity_px for disparity_px, _ in track.candidates],
+        candidate_weight=[weight for _, weight in track.candidates],
     )
 
 

@@ -149,13 +149,6 @@ class TrackerParameters(Parameters):
         minimum=0.1,
         maximum=0.99,
     )
-    still_target_rad_s: float = parameter(
-        0.05,
-        "a requested target that was slower than this rests: after a saccade it is found by its surroundings",
-        unit="rad/s",
-        minimum=0.0,
-        maximum=10.0,
-    )
     anchor_similarity: float = parameter(
         0.8,
         "least correlation with the surroundings of a requested point at which its position is corrected for drift",
@@ -170,6 +163,25 @@ class TrackerParameters(Parameters):
     )
     anchor_px: int = parameter(
         6, "half side of the search that corrects the drift of a requested point", unit="px", minimum=2, maximum=40
+    )
+    depth_memory: float = parameter(
+        0.7,
+        "share of the weights of a requested target's possible distances that the next pair leaves",
+        minimum=0.0,
+        maximum=0.99,
+    )
+    depth_apart_rad: float = parameter(
+        0.013,
+        "difference in parallax from which two possible distances of a requested target are told apart",
+        unit="rad",
+        minimum=0.001,
+        maximum=0.1,
+    )
+    depth_share: float = parameter(
+        0.6,
+        "share of the weights of all possible distances that one must hold to be taken for the requested target's",
+        minimum=0.3,
+        maximum=0.99,
     )
     relock_s: float = parameter(
         0.5,

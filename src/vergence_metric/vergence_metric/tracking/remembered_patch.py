@@ -1,8 +1,10 @@
 """The appearance of a point in the image in which it was asked for, found again after the eye has turned.
 
 Turning a camera about its optical centre warps its image by a homography that the joint angles give, whatever the
-depth. The patch is therefore warped to how it must look now, and only its place is searched: the reported
-angles of hobby servos are off by up to degrees.
+depth. What was seen is therefore warped to how it must look now, and only its place is searched, coarse to fine: the
+reported angles of hobby servos are off by up to degrees. The wide view says where the eye has turned to, the context
+where the point is (beside the wide view's place if it is near and the lens is off its axis), the point itself the rest.
+Along an edge or without texture, where a level looks the same everywhere, the place of the level before is kept.
 """
 
 import math
@@ -17,26 +19,31 @@ from vergence_metric.disparity.fovea_pair import cut
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.tracking.eye_view import EyeView, Pixel
 
-_CONTEXT_HALF_PX = 48  # what lies around the point says where it is; on photographs the smallest that rarely errs
-_POINT_HALF_PX = 16  # what lies at the point itself says exactly where
-_CONTEXT_SCALE = 2  # the context is searched at half resolution
+_WIDE_HALF_PX, _WIDE_SCALE = 160, 4
+_WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context is looked for
+_WIDE_REACH_PX = 16  # that parallax may move the point beside it
+_CONTEXT_HALF_PX, _CONTEXT_SCALE = 48, 2  # on photographs the smallest that rarely errs
+_POINT_HALF_PX = 16
 _CANDIDATES = 3
 _APART_PX = 12.0  # two peaks of the context closer than this are one place
 _REFINED_WITHIN_PX = 4
-_LEVER_PX = 16.0
-_LEAST_CONTRAST = 1.0  # standard deviation of the template [grey levels]
-_PRIOR = 0.05  # similarity that a place at the rim of the search must be better by
+_LEAST_CONTRAST = 1.0  # standard deviation of a template [grey levels]
+_PRIOR, _WIDE_PRIOR, _POINT_PRIOR = 0.05, 0.15, 0.03  # similarity by which a place at the rim of its search is worse
+
+Sides = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
 class PatchSighting:
     """Where the point is in the image now.
 
-    `similarity` is the correlation of the point's surroundings with the remembered ones (-1 to 1).
+    `similarity` is the correlation of the point's surroundings with the remembered ones, `at_point` that of what lies
+    at the point itself (-1 to 1).
     """
 
     pixel: Pixel
     similarity: float
+    at_point: float
 
 
 class RememberedPatch:
@@ -45,124 +52,133 @@ class RememberedPatch:
     def __init__(self, image: Image, view: EyeView, pixel: Pixel) -> None:
         self._view = view
         self.direction = view.direction(pixel)
-        reach = round(1.6 * _CONTEXT_HALF_PX)
-        x0, y0 = round(pixel[0]) - reach, round(pixel[1]) - reach
-        self._crop = cut(image, x0, y0, 2 * reach + 1, 2 * reach + 1)
-        self._origin = np.array([x0, y0], dtype=np.float64)
-        height, width = image.shape
-        # (left, top, right, bottom): how far the image reaches about the pixel
-        self._reaches = (pixel[0], pixel[1], width - 1 - pixel[0], height - 1 - pixel[1])
+        self._levels = {scale: _reduced(image, scale) for scale in (1, _CONTEXT_SCALE, _WIDE_SCALE)}
+        self._reaches = _reaches(image, pixel)
 
     def find(self, image: Image, view: EyeView, direction: NDArray[np.float64], reach_px: int) -> PatchSighting | None:
-        """Return where it is, looked for within `reach_px` of `direction` (3,) in rig_base; None outside the image."""
-        expected = view.pixel(direction)
+        """Return where it is, expected within `reach_px` of `direction` (3,) in rig_base; None outside the image."""
+        expected, reach = view.pixel(direction), max(reach_px, _WIDE_REACH_PX)
+        prior = _PRIOR * (reach / max(reach_px, 1)) ** 2
         height, width = image.shape
         if not (-reach_px <= expected[0] < width + reach_px and -reach_px <= expected[1] < height + reach_px):
             return None
-        then_from_now = self._mapping(view, direction)
-        middle = (round(expected[0]), round(expected[1]))
-        places = self._context_peaks(image, middle, then_from_now, reach_px)
+        wide = self._places(image, view, expected, reach, (_WIDE_HALF_PX, _WIDE_SCALE), 1, prior)
+        if wide and wide[0][1] >= _WIDE_SIMILARITY:
+            expected, reach, prior = wide[0][0], _WIDE_REACH_PX, _WIDE_PRIOR
+        places = self._places(image, view, expected, reach, (_CONTEXT_HALF_PX, _CONTEXT_SCALE), _CANDIDATES, prior)
         if not places:
             return None
-        template = self._warped(then_from_now, _POINT_HALF_PX)
-        sides = self._sides(_POINT_HALF_PX, 1)
+        template, sides = self._template(image, view, expected, (_POINT_HALF_PX, 1))
         found = []
         for place, similarity in places:
-            pixel, at_point, _ = _best_near(image, _part(template, sides), sides, place, _REFINED_WITHIN_PX)
-            off = math.hypot(pixel[0] - expected[0], pixel[1] - expected[1]) / max(reach_px, 1)
-            found.append((similarity + at_point - _PRIOR * off**2, similarity, pixel))
-        _, similarity, pixel = max(found)
-        return PatchSighting(pixel, similarity)
+            pixel, at_point, _ = _best_near(image, template, sides, place, _REFINED_WITHIN_PX)
+            off = math.hypot(place[0] - expected[0], place[1] - expected[1]) / reach
+            found.append((similarity + at_point - prior * off**2, similarity, at_point, pixel))
+        _, similarity, at_point, pixel = max(found)
+        return PatchSighting(pixel, similarity, at_point)
 
     def refine(self, image: Image, view: EyeView, pixel: Pixel, reach_px: int) -> tuple[PatchSighting, float]:
         """Return where the point itself is within `reach_px` of a pixel, and its similarity at that pixel.
 
         Only its nearest surroundings count: those of a moving object change.
         """
-        template = self._warped(self._mapping(view, view.direction(pixel)), _POINT_HALF_PX)
-        sides = self._sides(_POINT_HALF_PX, 1)
-        place, similarity, here = _best_near(image, _part(template, sides), sides, pixel, reach_px)
-        return PatchSighting(place, similarity), here
+        template, sides = self._template(image, view, pixel, (_POINT_HALF_PX, 1))
+        place, similarity, here = _best_near(image, template, sides, pixel, reach_px)
+        return PatchSighting(place, similarity, similarity), here
 
-    def _mapping(self, view: EyeView, direction: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the affine map (2, 3) from offsets about the expected pixel now to pixels of the remembered crop."""
-        x, y = view.pixel(direction)
-        levers = [(_LEVER_PX, 0.0), (-_LEVER_PX, 0.0), (0.0, _LEVER_PX), (0.0, -_LEVER_PX)]
-        right, left, down, up = (np.array(self._view.pixel(view.direction((x + dx, y + dy)))) for dx, dy in levers)
-        centre = np.array(self._view.pixel(self.direction)) - self._origin
-        return np.column_stack([(right - left) / (2 * _LEVER_PX), (down - up) / (2 * _LEVER_PX), centre])
+    def _template(self, image: Image, view: EyeView, at: Pixel, size: tuple[int, int]) -> tuple[Image, Sides]:
+        """Return what must be seen about a pixel now, as far as both images reach, and how far that is on each side.
 
-    def _warped(self, then_from_now: NDArray[np.float64], half_px: int, scale: int = 1) -> Image:
-        """Return the patch as it must look now, (2 half_px + 1) square in pixels of `scale`."""
-        linear = scale * then_from_now[:, :2]
-        offset = then_from_now[:, 2] - linear @ [half_px, half_px]
-        crop = cv2.GaussianBlur(self._crop, (0, 0), 0.4 * scale) if scale > 1 else self._crop
-        size = (2 * half_px + 1, 2 * half_px + 1)
-        return np.asarray(
-            cv2.warpAffine(
-                crop,
-                np.column_stack([linear, offset]),
-                size,
-                flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-                borderMode=cv2.BORDER_REPLICATE,
-            )
+        `size` is (half side [px], scale); the template and its sides are in pixels of the scale.
+        """
+        half_px, scale = size
+        now = _reaches(image, at)
+        reaches = [min(a, b) / scale for a, b in zip(self._reaches, now, strict=True)]
+        left, top, right, bottom = (min(max(int(reach) - 1, 3), half_px // scale) for reach in reaches)
+        # The point keeps its place; the corners about it move as the eye has turned.
+        corners = np.array([(-left, -top), (right, -top), (right, bottom), (-left, bottom)], np.float32)
+        turned = view.direction(at)
+        middle = np.array(self._view.pixel(turned))
+        then = [self._view.pixel(view.direction((at[0] + scale * x, at[1] + scale * y))) for x, y in corners]
+        place = np.array(self._view.pixel(self.direction))
+        source = (np.array(then) - middle + place - 0.5 * (scale - 1)) / scale
+        warp = cv2.getPerspectiveTransform(corners + np.float32([left, top]), source.astype(np.float32))
+        template = cv2.warpPerspective(
+            self._levels[scale],
+            warp,
+            (left + right + 1, top + bottom + 1),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_REPLICATE,
         )
+        return np.asarray(template), (left, top, right, bottom)
 
-    def _sides(self, half_px: int, scale: int) -> tuple[int, int, int, int]:
-        """Return how far the template reaches to the left, top, right and bottom: not beyond the remembered image."""
-        left, top, right, bottom = (min(max(int(reach / scale) - 1, 3), half_px) for reach in self._reaches)
-        return left, top, right, bottom
-
-    def _context_peaks(
-        self, image: Image, middle: tuple[int, int], then_from_now: NDArray[np.float64], reach_px: int
+    def _places(
+        self,
+        image: Image,
+        view: EyeView,
+        expected: Pixel,
+        reach_px: int,
+        size: tuple[int, int],
+        most: int,
+        prior: float,
     ) -> list[tuple[Pixel, float]]:
-        """Return the best places of the context, in pixels of the image, with their correlation."""
-        scale, half = _CONTEXT_SCALE, _CONTEXT_HALF_PX // _CONTEXT_SCALE
-        reach = -(-reach_px // scale)
-        left, top, right, bottom = sides = self._sides(half, scale)
-        template = _part(self._warped(then_from_now, half, scale), sides)
+        """Return up to `most` places of the template of a size, the best first, with their correlation."""
+        scale, reach = size[1], -(-reach_px // size[1])
+        template, sides = self._template(image, view, expected, size)
         if float(template.std()) < _LEAST_CONTRAST:
             return []
-        width, height = left + right + 1 + 2 * reach, top + bottom + 1 + 2 * reach
-        area = cut(
-            image,
-            middle[0] - scale * (left + reach),
-            middle[1] - scale * (top + reach),
-            scale * (width - 1) + 1,
-            scale * (height - 1) + 1,
-        )
-        # Every second pixel of the smoothed area, so that the pixels of both scales have the same centres.
-        small = np.ascontiguousarray(cv2.GaussianBlur(area, (0, 0), 0.4 * scale)[::scale, ::scale])
-        surface = _correlation(small, template)
+        at = (round(expected[0]), round(expected[1]))
+        left, top, right, bottom = (scale * (side + reach) for side in sides)
+        area = cut(image, at[0] - left, at[1] - top, left + right + scale, top + bottom + scale)
+        surface = _correlation(_reduced(area, scale), template)
+        ranked = surface - _cost(surface, prior)
+        middle_px = 0.5 * (scale - 1) - scale * reach
         places: list[tuple[Pixel, float]] = []
-        apart = int(_APART_PX) // scale
-        for _ in range(_CANDIDATES):
-            j, i = divmod(int(surface.argmax()), surface.shape[1])
-            value = float(surface[j, i])
-            if value <= 0.0:
+        apart = max(int(_APART_PX) // scale, 1)
+        for _ in range(most):
+            j, i = divmod(int(ranked.argmax()), ranked.shape[1])
+            if ranked[j, i] <= -1.0 or surface[j, i] <= 0.0:
                 break
-            places.append(((middle[0] + scale * (i - reach), middle[1] + scale * (j - reach)), value))
-            surface[max(j - apart, 0) : j + apart + 1, max(i - apart, 0) : i + apart + 1] = -1.0
+            di, dj = peak_offset(ranked, i, j)
+            place = (at[0] + scale * (i + di) + middle_px, at[1] + scale * (j + dj) + middle_px)
+            places.append((place, float(surface[j, i])))
+            ranked[max(j - apart, 0) : j + apart + 1, max(i - apart, 0) : i + apart + 1] = -2.0
         return places
 
 
-def _part(template: Image, sides: tuple[int, int, int, int]) -> Image:
-    """Return the part of a square template that reaches this far to the left, top, right and bottom of its middle."""
-    half = template.shape[0] // 2
-    left, top, right, bottom = sides
-    return np.ascontiguousarray(template[half - top : half + bottom + 1, half - left : half + right + 1])
+def _reaches(image: Image, pixel: Pixel) -> tuple[float, float, float, float]:
+    """Return how far an image reaches to the left, top, right and bottom of a pixel."""
+    height, width = image.shape
+    return pixel[0], pixel[1], width - 1 - pixel[0], height - 1 - pixel[1]
 
 
-def _best_near(
-    image: Image, template: Image, sides: tuple[int, int, int, int], place: Pixel, reach: int
-) -> tuple[Pixel, float, float]:
-    """Return the sub-pixel place within reach where the template fits best, its correlation, and that at `place`."""
+def _reduced(image: Image, scale: int) -> Image:
+    """Return the image with the mean of every `scale` by `scale` pixels as one."""
+    if scale == 1:
+        return image
+    height, width = image.shape
+    size = (width // scale, height // scale)
+    return np.asarray(cv2.resize(image[: size[1] * scale, : size[0] * scale], size, interpolation=cv2.INTER_AREA))
+
+
+def _cost(surface: NDArray[np.float32], prior: float) -> NDArray[np.float32]:
+    """Return by how much each place of a search is worse for its distance from the middle: `prior` at the rim."""
+    down, across = (np.linspace(-1.0, 1.0, n, dtype=np.float32) ** 2 if n > 1 else np.zeros(1) for n in surface.shape)
+    return np.asarray(np.float32(prior) * np.add.outer(down, across), np.float32)
+
+
+def _best_near(image: Image, template: Image, sides: Sides, place: Pixel, reach: int) -> tuple[Pixel, float, float]:
+    """Return the sub-pixel place within reach where the template fits best, its correlation, and that at `place`.
+
+    Of places that fit alike the nearest counts.
+    """
     left, top, _, _ = sides
     x0, y0 = round(place[0]) - left - reach, round(place[1]) - top - reach
     area = cut(image, x0, y0, template.shape[1] + 2 * reach, template.shape[0] + 2 * reach)
     surface = _correlation(area, template)
-    j, i = divmod(int(surface.argmax()), surface.shape[1])
-    di, dj = peak_offset(surface, i, j)
+    nearest = surface - _cost(surface, _POINT_PRIOR)
+    j, i = divmod(int(nearest.argmax()), surface.shape[1])
+    di, dj = peak_offset(nearest, i, j)
     return (x0 + left + i + di, y0 + top + j + dj), float(surface[j, i]), float(surface[reach, reach])
 
 

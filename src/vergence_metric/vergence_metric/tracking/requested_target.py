@@ -4,46 +4,87 @@ from dataclasses import replace
 
 import numpy as np
 
-from vergence_metric.disparity.protocol import DisparityEstimator, Image
-from vergence_metric.tracking.eye_view import EyeView, Pixel
+from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
+from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
+from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
-from vergence_metric.tracking.tracked_target import Target
+from vergence_metric.tracking.tracked_target import Target, parallax
 
 USUAL_EXTENT_PX = (60.0, 60.0)
+_SAME_PX = 2.0  # candidates this close to the answer are it
+_REST_PX, _MOVED_PX, _MOVED_SHARE = 4.0, 8.0, 0.3  # how far a visible target may be from where it is expected
 
 
-def requested_target(track_id: int, request: TrackRequest, pair: StoredPair, estimator: DisparityEstimator) -> Target:
+def requested_target(
+    track_id: int,
+    request: TrackRequest,
+    pair: StoredPair,
+    estimator: DisparityEstimator,
+    parameters: TrackerParameters,
+) -> Target:
     """Return the target of a request, as it is in the pair in which it was asked for, to be found in the next one."""
     point = request.pixel if request.left_eye else _in_left_eye(request.pixel, pair, estimator)
     patch = RememberedPatch(pair.left, pair.views[0], point)
     appearance = TargetAppearance(pair.left, point, request.extent_px or USUAL_EXTENT_PX)
     target = Target(track_id, pair.stamp_s, appearance, pair.stamp_s, patch.direction, np.zeros(3), True)
     target.patch, target.goal_id, target.hidden, target.found = patch, request.goal_id, True, False
-    disparity = estimator.estimate(pair.left, pair.right, point)
-    if disparity.ok:
-        shifted = (point[0] - disparity.horizontal_px, point[1] - disparity.vertical_px)
-        target.update_parallax(pair.stamp_s, point, pair.views, shifted)
+    target.depths = DepthHypotheses(parameters.depth_memory, parameters.depth_apart_rad, parameters.depth_share)
+    weigh_depths(target, target.depths, estimator.estimate(pair.left, pair.right, point), point, pair.views)
     return target
+
+
+def weigh_depths(
+    target: Target, depths: DepthHypotheses, disparity: Disparity, left_px: Pixel, views: tuple[EyeView, EyeView]
+) -> bool:
+    """Add what a pair says of the target's distance; returns whether it is the likeliest by now.
+
+    The answer has its confidence as probability, the estimator's other candidates share the rest by their likelihood.
+    """
+    if disparity.status not in (DisparityStatus.OK, DisparityStatus.AMBIGUOUS):
+        return False
+    sure = disparity.confidence
+    others = [c for c in disparity.candidates if abs(c.disparity_px - disparity.horizontal_px) > _SAME_PX]
+    likelihood = sum(c.likelihood for c in others)
+    left_over = (1.0 - sure) / max(likelihood, 1.0 - sure, 1e-6)
+    seen = [(disparity.horizontal_px, sure), *((c.disparity_px, left_over * c.likelihood) for c in others)]
+    y = left_px[1] - disparity.vertical_px
+    answered = depths.update([(parallax(left_px, views, (left_px[0] - d, y)), share) for d, share in seen])
+    if depths.best is not None:
+        target.parallax_rad = depths.best.parallax_rad
+    return answered is depths.best
 
 
 def find_by_surroundings(
     target: Target, patch: RememberedPatch, left: Image, stamp_s: float, view: EyeView, parameters: TrackerParameters
 ) -> Sighting | None:
-    """Return where a requested target that rests is, by what surrounded it at its request; None outside the image.
+    """Return where a requested target that rests is, by what surrounded it at its request; None where it is not known.
 
-    The surroundings are larger than the target and surer; of a target that moves they say nothing.
+    The surroundings are larger than the target and surer: along an edge the target looks the same everywhere, and
+    servos that do not turn as they report would carry it along. Of a target that moves they say nothing: one that was
+    visible and no longer looks like itself where they are has left them. Before it is found for the first time, its
+    best place is returned however unlike it is.
     """
-    reach_px = parameters.request_search_px + parameters.search_growth_px_s * (stamp_s - target.seen_s)
-    reach_px = min(reach_px, parameters.request_search_max_px)
-    found = patch.find(left, view, target.predicted(stamp_s), round(reach_px))
+    p = parameters
+    # Joints that report no move have not moved; those that do may rest in their play, or lag behind.
+    moved_px = distance(view.pixel(target.direction), target.appearance.pixel)
+    reach_px = min(_REST_PX + (_MOVED_PX + _MOVED_SHARE * moved_px if moved_px > 0.5 else 0.0), p.search_px)
+    if target.hidden:
+        reach_px = p.request_search_px + p.search_growth_px_s * (stamp_s - target.seen_s)
+        reach_px = min(reach_px, p.request_search_max_px)
+    found = patch.find(left, view, target.direction, round(reach_px))
     if found is None:
         return None
-    if found.similarity >= parameters.request_similarity:
+    alike = found.similarity >= p.request_similarity
+    if target.found and not (alike and (target.hidden or found.at_point >= p.anchor_similarity)):
+        return None
+    if alike and target.hidden:
         target.appearance = TargetAppearance(left, found.pixel, target.appearance.extent_px)
         target.found = True
+    else:
+        target.appearance.drop_features()
     return Sighting(found.pixel, found.similarity, 0)
 
 

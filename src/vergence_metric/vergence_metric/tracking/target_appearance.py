@@ -85,9 +85,13 @@ class TargetAppearance:
 
     def search(self, image: Image, expected_px: Pixel, reach_px: int) -> Sighting:
         """Return the target's most similar position within reach of the expected one, by template alone."""
-        self._carried, self._step = np.empty((0, 2), np.float32), 1.0
+        self.drop_features()
         pixel, similarity = self._anchor(image, expected_px, reach_px)
         return Sighting(pixel, similarity, 0)
+
+    def drop_features(self) -> None:
+        """Forget the features that were followed: the target's next position does not come from them."""
+        self._carried, self._step = np.empty((0, 2), np.float32), 1.0
 
     def accept(self, image: Image, sighting: Sighting, renew: bool) -> None:
         """Accept a sighting as the target's position; `renew` also updates the recent template."""

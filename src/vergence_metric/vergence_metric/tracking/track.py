@@ -17,6 +17,7 @@ class TrackStatus(IntEnum):
     LOST = 2
     OCCLUDED = 3
     UNLOCKED = 4
+    AMBIGUOUS = 5
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Track:
     `left_px`, `right_px` (x, y) in the images given, `disparity_px` = x_left - x_right, `extent_px` (width, height) of
     the locked region at its present scale. `confidence` is the similarity to the target's appearance, lowered where the
     disparity could not be measured. `goal_id` is that of the request which the track answers, 0 for none.
+    `candidates` are the disparities [px] that a requested target may have, likeliest first, each with its weight.
     """
 
     track_id: int
@@ -40,6 +42,7 @@ class Track:
     status: TrackStatus
     reason: str
     goal_id: int = 0
+    candidates: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def nowhere(cls, track_id: int, status: TrackStatus, reason: str, lock_stamp_s: float = math.nan) -> "Track":

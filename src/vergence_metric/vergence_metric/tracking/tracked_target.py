@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel
 from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_metric.tracking.target_appearance import TargetAppearance
@@ -33,6 +34,7 @@ class Target:
     right_seen_s: float = -math.inf
     parallax_rad: float = math.nan  # angle from the left eye's ray to the right eye's, in the plane of the baseline
     patch: RememberedPatch | None = None  # of a requested target
+    depths: DepthHypotheses | None = None  # of a requested target
     found: bool = True  # since its request
     goal_id: int = 0
     sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # recent stamps and directions
@@ -84,7 +86,7 @@ class Target:
     def update_parallax(self, stamp_s: float, left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> None:
         """Update the parallax, the angle between the two eyes' rays, which does not depend on the eyes' motion."""
         self.right_seen_s = stamp_s
-        self.parallax_rad = _across(views[1].direction(right_px)) - _across(views[0].direction(left_px))
+        self.parallax_rad = parallax(left_px, views, right_px)
 
     def disparity_age_s(self, stamp_s: float) -> float:
         """Return the time since the target was last matched in the right eye [s]."""
@@ -94,14 +96,23 @@ class Target:
         """Return the predicted disparity at a left pixel with the eyes in `views`, None if never measured."""
         if math.isnan(self.parallax_rad):
             return None
+        return self.disparity_of(self.parallax_rad, left_px, views)
+
+    def disparity_of(self, parallax_rad: float, left_px: Pixel, views: tuple[EyeView, EyeView]) -> float | None:
+        """Return the disparity that a parallax gives at a left pixel, None if the right eye could not see it."""
         left = views[0].direction(left_px)
-        angle = _across(left) + self.parallax_rad
+        angle = _across(left) + parallax_rad
         # Same elevation about the baseline, rotated by the parallax.
         forward = left * np.array([1.0, 0.0, 1.0])
         forward /= np.linalg.norm(forward)
         right = forward * math.cos(angle) + np.array([0.0, math.sin(angle), 0.0])
         x = views[1].pixel(right)[0]
         return left_px[0] - x if math.isfinite(x) else None
+
+
+def parallax(left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> float:
+    """Return the angle from the left eye's ray to the right eye's, in the plane of the baseline [rad]."""
+    return _across(views[1].direction(right_px)) - _across(views[0].direction(left_px))
 
 
 def _across(direction: np.ndarray) -> float:

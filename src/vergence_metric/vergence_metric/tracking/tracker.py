@@ -20,6 +20,7 @@ import numpy as np
 
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
 from vergence_metric.pairs.frame_motion import frame_motion_px
+from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair, TrackRequest
@@ -27,6 +28,7 @@ from vergence_metric.tracking.requested_target import (
     USUAL_EXTENT_PX,
     find_by_surroundings,
     requested_target,
+    weigh_depths,
     without_drift,
 )
 from vergence_metric.tracking.saccade_detector import EyeMotion, SaccadeDetector, StampedEyeAngles
@@ -74,7 +76,7 @@ class TargetTracker:
         """Follow a point of a stored pair from now on, on behalf of the request's goal."""
         self._track_id += 1
         self._wants_lock = False
-        self._target = requested_target(self._track_id, request, pair, self._estimator)
+        self._target = requested_target(self._track_id, request, pair, self._estimator, self._parameters)
 
     def lock_here(self) -> None:
         """Lock again on the object at the fovea as soon as the eyes are at rest, as after a saccade."""
@@ -102,7 +104,7 @@ class TargetTracker:
         )
         before, self._before, self._stamp_s = self._before, left, stamp_s
         if self._target is not None and self._target.patch is not None:
-            return self._follow(self._target, left, right, stamp_s, views)
+            return self._follow(self._target, left, right, stamp_s, views, motion.saccading)
         self._wants_lock |= motion.jumped
         if self._target is not None:
             track = self._follow(self._target, left, right, stamp_s, views)
@@ -163,7 +165,13 @@ class TargetTracker:
         return self._visible(self._target, Sighting(point, 1.0, 0), disparity, views)
 
     def _follow(
-        self, target: Target, left: Image, right: Image, stamp_s: float, views: tuple[EyeView, EyeView]
+        self,
+        target: Target,
+        left: Image,
+        right: Image,
+        stamp_s: float,
+        views: tuple[EyeView, EyeView],
+        saccading: bool = False,
     ) -> Track:
         """Find the target again in the next pair."""
         p = self._parameters
@@ -184,12 +192,17 @@ class TargetTracker:
             return self._hidden(
                 target, f"target hidden for {hidden_s:.1f} s, best similarity {sighting.similarity:.2f}"
             )
+        if target.depths is not None:
+            if saccading:
+                # The servos are not where they report: what the eyes pass is no evidence of where the target is.
+                return self._in_left_eye(target, sighting, "the eyes are in a saccade")
+            return self._follow_requested(target, target.depths, sighting, left, right, views)
         fixated = target.fixated_px(sighting.pixel)
         expected_px = target.expected_disparity(fixated, views)
         disparity = self._estimator.estimate(left, right, fixated, expected_px)
         if not disparity.ok and fixated != sighting.pixel:
             disparity = self._estimator.estimate(left, right, sighting.pixel, expected_px)
-        if target.patch is None and disparity.ok and expected_px is not None and target.disparity_age_s(stamp_s) < 0.5:
+        if disparity.ok and expected_px is not None and target.disparity_age_s(stamp_s) < 0.5:
             jump = disparity.horizontal_px - expected_px
             # Servos without feedback are off their reported angles while they move: unchanged appearance counts more.
             if abs(jump) > p.disparity_jump_px and sighting.similarity < _UNMISTAKABLE_SIMILARITY:
@@ -208,12 +221,36 @@ class TargetTracker:
         target.update_direction(stamp_s, views[0].direction(sighting.pixel))
         return self._visible(target, sighting, disparity, views)
 
+    def _follow_requested(
+        self,
+        target: Target,
+        depths: DepthHypotheses,
+        sighting: Sighting,
+        left: Image,
+        right: Image,
+        views: tuple[EyeView, EyeView],
+    ) -> Track:
+        """Return the track of a requested target that was found in the left eye: at its likeliest distance so far."""
+        expected_px = target.expected_disparity(sighting.pixel, views) if depths.certain else None
+        disparity = self._estimator.estimate(left, right, sighting.pixel, expected_px)
+        likeliest = weigh_depths(target, depths, disparity, sighting.pixel, views)
+        target.appearance.accept(left, sighting, renew=disparity.ok)
+        target.update_direction(self._stamp_s, views[0].direction(sighting.pixel))
+        track = self._in_left_eye(target, sighting, disparity.reason or "another distance is likelier")
+        ranked = [(target.disparity_of(one.parallax_rad, sighting.pixel, views), one.weight) for one in depths.ranked]
+        track = replace(track, candidates=tuple((d, weight) for d, weight in ranked if d is not None))
+        if likeliest:
+            track = self._in_both_eyes(track, target, disparity, views)
+        if depths.certain or len(depths.ranked) < 2:
+            return track
+        return replace(track, status=TrackStatus.AMBIGUOUS, reason=f"{len(depths.ranked)} distances fit")
+
     def _find(self, target: Target, left: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Sighting | None:
         """Return the best sighting in the left image; None if it is predicted outside."""
         p = self._parameters
-        if target.patch is not None and target.hidden and target.speed_rad_s <= p.still_target_rad_s:
+        if target.patch is not None:
             sighting = find_by_surroundings(target, target.patch, left, stamp_s, views[0], p)
-            if not target.found or (sighting and sighting.similarity >= p.request_similarity):
+            if sighting is not None or not target.found:
                 return sighting
         expected = views[0].pixel(target.predicted(stamp_s))
         # A hidden target has moved on as predicted, or stayed where it was last seen.
@@ -238,12 +275,16 @@ class TargetTracker:
         self, target: Target, sighting: Sighting, disparity: Disparity, views: tuple[EyeView, EyeView]
     ) -> Track:
         """Return the track of a target that was found in the left eye."""
-        fixated = target.fixated_px(sighting.pixel)
-        expected_px = target.expected_disparity(fixated, views)
+        expected_px = target.expected_disparity(target.fixated_px(sighting.pixel), views)
+        track = self._in_left_eye(target, sighting, disparity.reason)
+        if not is_plausible(disparity, expected_px, self._parameters.disparity_jump_px):
+            return track
+        return self._in_both_eyes(track, target, disparity, views)
+
+    def _in_left_eye(self, target: Target, sighting: Sighting, reason: str) -> Track:
         similarity = min(max((sighting.similarity - 0.3) / 0.6, 0.0), 1.0)
         scale = target.appearance.scale
-        extent = (target.appearance.extent_px[0] * scale, target.appearance.extent_px[1] * scale)
-        track = Track(
+        return Track(
             target.track_id,
             target.lock_stamp_s,
             sighting.pixel,
@@ -251,24 +292,26 @@ class TargetTracker:
             math.nan,
             math.nan,
             math.nan,
-            extent,
+            (target.appearance.extent_px[0] * scale, target.appearance.extent_px[1] * scale),
             similarity * _CONFIDENCE_WITHOUT_DISPARITY,
             TrackStatus.OCCLUDED,
-            f"target not found in the right eye: {disparity.reason}",
+            f"target not found in the right eye: {reason}",
             target.goal_id,
         )
-        if not is_plausible(disparity, expected_px, self._parameters.disparity_jump_px):
-            return track
+
+    def _in_both_eyes(
+        self, track: Track, target: Target, disparity: Disparity, views: tuple[EyeView, EyeView]
+    ) -> Track:
         shift = np.array([disparity.horizontal_px, disparity.vertical_px])
-        right_px = (sighting.pixel[0] - shift[0], sighting.pixel[1] - shift[1])
+        fixated = target.fixated_px(track.left_px)
         target.update_parallax(self._stamp_s, fixated, views, (fixated[0] - shift[0], fixated[1] - shift[1]))
         return replace(
             track,
-            right_px=right_px,
+            right_px=(track.left_px[0] - shift[0], track.left_px[1] - shift[1]),
             disparity_px=disparity.horizontal_px,
             vertical_px=disparity.vertical_px,
             sigma_px=disparity.sigma_px,
-            confidence=similarity * (1.0 if disparity.ok else 0.8),
+            confidence=track.confidence / _CONFIDENCE_WITHOUT_DISPARITY * (1.0 if disparity.ok else 0.8),
             status=TrackStatus.OK,
             reason="" if disparity.ok else disparity.reason,
         )
