@@ -155,6 +155,8 @@ class TargetTracking(TargetEstimator):
                 distances_m.append(f"{np.linalg.norm(point_m):.2f} m")
             else:
                 distances_m.append("far away")
+        if len(distances_m) < 2:
+            return "the target's distance is not certain"
         return f"the target may be at one of several distances: {', '.join(distances_m)}"
 
     def _observe_play(self, sighting: TrackSighting, seen_rad: Array) -> None:

@@ -26,7 +26,7 @@ class DepthHypotheses:
     Args:
         memory: share of the old weights that a pair leaves.
         apart_rad: parallaxes that differ by less may be the same.
-        share: of all weights that the best must hold to be certain.
+        share: of the recent pairs that must speak for the likeliest for it to be certain.
     """
 
     def __init__(self, memory: float, apart_rad: float, share: float) -> None:
@@ -42,9 +42,8 @@ class DepthHypotheses:
 
     @property
     def certain(self) -> bool:
-        """True if the likeliest holds enough of all weights, and no rival the rest."""
-        total = sum(one.weight for one in self.ranked)
-        return bool(self.ranked) and self.ranked[0].weight >= self._share * max(total, self._share)
+        """True if enough of the recent pairs speak for the likeliest."""
+        return bool(self.ranked) and self.ranked[0].weight >= self._share
 
     def update(self, candidates: Sequence[tuple[float, float]]) -> Hypothesis | None:
         """Add the candidates of a pair, as (parallax [rad], probability), the answer first; returns its hypothesis."""

@@ -165,7 +165,7 @@ class TrackerParameters(Parameters):
         6, "half side of the search that corrects the drift of a requested point", unit="px", minimum=2, maximum=40
     )
     depth_memory: float = parameter(
-        0.7,
+        0.85,
         "share of the weights of a requested target's possible distances that the next pair leaves",
         minimum=0.0,
         maximum=0.99,
@@ -178,8 +178,8 @@ class TrackerParameters(Parameters):
         maximum=0.1,
     )
     depth_share: float = parameter(
-        0.6,
-        "share of the weights of all possible distances that one must hold to be taken for the requested target's",
+        0.5,
+        "share of the recent pairs that must speak for a distance of a requested target; below it several may fit",
         minimum=0.3,
         maximum=0.99,
     )

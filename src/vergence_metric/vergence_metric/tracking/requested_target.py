@@ -44,6 +44,7 @@ def weigh_depths(
     The answer has its confidence as probability, the estimator's other candidates share the rest by their likelihood.
     """
     if disparity.status not in (DisparityStatus.OK, DisparityStatus.AMBIGUOUS):
+        depths.update([])
         return False
     sure = disparity.confidence
     others = [c for c in disparity.candidates if abs(c.disparity_px - disparity.horizontal_px) > _SAME_PX]

@@ -241,9 +241,10 @@ class TargetTracker:
         track = replace(track, candidates=tuple((d, weight) for d, weight in ranked if d is not None))
         if likeliest:
             track = self._in_both_eyes(track, target, disparity, views)
-        if depths.certain or len(depths.ranked) < 2:
+        if depths.certain:
             return track
-        return replace(track, status=TrackStatus.AMBIGUOUS, reason=f"{len(depths.ranked)} distances fit")
+        fit = f"{len(depths.ranked)} distances fit" if len(depths.ranked) > 1 else "its distance is not certain"
+        return replace(track, status=TrackStatus.AMBIGUOUS, reason=fit)
 
     def _find(self, target: Target, left: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Sighting | None:
         """Return the best sighting in the left image; None if it is predicted outside."""
