@@ -8,7 +8,6 @@ import math
 import time
 from collections.abc import Iterable
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -16,8 +15,8 @@ from bench.photos_data import KnownPoint, grey_pair, motorcycle_points, pair_nam
 from bench.results import Row
 from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
+from vergence_sim.photo.matching import semi_global
 
-Image = npt.NDArray[np.uint8]
 Array = npt.NDArray[np.float64]
 
 POINTS = 1000
@@ -45,7 +44,7 @@ def rows(points: list[KnownPoint]) -> list[Row]:
     for name in names:
         left, right = grey_pair(name)
         began = time.perf_counter()
-        dense = _sgbm(left, right)
+        dense = semi_global(left, right)
         frame_s += time.perf_counter() - began
         for point in (p for p in points if p.pair == name):
             began = time.perf_counter()
@@ -98,25 +97,6 @@ def _ranks(values: Array) -> Array:
     _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
     last = np.cumsum(counts)
     return np.asarray((last - 0.5 * (counts - 1))[which], np.float64)
-
-
-def _sgbm(left: Image, right: Image) -> Array:
-    """Return the disparity (h, w) [px] by semi-global matching in all directions, NaN where it has none."""
-    block = 5
-    matcher = cv2.StereoSGBM_create(  # type: ignore[attr-defined]  # missing in OpenCV's own type stubs
-        minDisparity=0,
-        numDisparities=128,
-        blockSize=block,
-        P1=8 * block**2,
-        P2=32 * block**2,
-        disp12MaxDiff=1,
-        uniquenessRatio=5,
-        speckleWindowSize=50,
-        speckleRange=2,
-        mode=cv2.STEREO_SGBM_MODE_HH,
-    )
-    fixed = matcher.compute(left, right)
-    return np.where(fixed >= 0, fixed / 16.0, np.nan)
 
 
 def _at(dense: Array, point: KnownPoint) -> float:
