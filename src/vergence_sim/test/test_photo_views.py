@@ -13,8 +13,9 @@ from vergence_sim.optics import Lens
 from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint
 from vergence_sim.photo.views import PhotoEye, mount_rotation, padded
-from vergence_sim.photo.world import EYES, PhotoWorld, cropped
+from vergence_sim.photo.world import PhotoWorld, cropped
 from vergence_sim.simulator import Simulator
+from vergence_sim.world import EYES
 
 CAMERA = CameraSpec(width_px=480, height_px=320, cx_px=239.5, cy_px=159.5)
 DISTORTION = (-0.04, 0.02, 0.0, 0.0, 0.0)

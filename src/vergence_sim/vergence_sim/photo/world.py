@@ -13,10 +13,9 @@ from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.joints import PhotoHead, Plant
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint
 from vergence_sim.photo.views import PhotoEye, mount_rotation
+from vergence_sim.world import EYES
 
 Image = npt.NDArray[np.uint8]
-
-EYES = ("left", "right")
 
 
 class PhotoWorld:
