@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vergence_bringup.demo import photo_report
-from vergence_bringup.demo.result import Series, StationResult
+from vergence_bringup.demo.result import Series, StationResult, verdict_line
 from vergence_bringup.figures.boxes import CORNERS, signed
 from vergence_bringup.figures.svg_plot import Line, plot
 
@@ -29,11 +29,10 @@ figure { margin: 0; } figure img { width: 100%; display: block; } figcaption { f
 
 def write_report(path: Path, results: Sequence[StationResult], settings: dict[str, Any], out_dir: Path) -> None:
     """Write the report; images are read from `out_dir`/pictures, where the demo wrote them."""
-    passed = sum(result.passed for result in results)
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'><title>Vergence demo</title>",
         f"<style>{_STYLE}</style></head><body><h1>Vergence demo</h1>",
-        f"<p>{passed} of {len(results)} stations verged, as reported by the graph and confirmed by the ground truth. "
+        f"<p>{verdict_line(results)}. "
         f"Servos: {html.escape(str(settings['servo']))}, cameras: {html.escape(str(settings['cameras']))}, "
         f"{settings['duration_s']:g} s in all.</p>",
     ]

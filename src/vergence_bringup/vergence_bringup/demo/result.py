@@ -145,7 +145,7 @@ def _numbers(values: Sequence[float]) -> list[float | None]:
 def summary(results: Sequence[StationResult], settings: dict[str, Any]) -> dict[str, Any]:
     """Return the content of summary.json; unknown figures are null."""
     return {
-        "passed": bool(results) and all(result.passed for result in results),
+        "passed": all_passed(results),
         **settings,
         "stations": [
             {
@@ -197,6 +197,20 @@ def write_summary(path: Path, results: Sequence[StationResult], settings: dict[s
     """Write summary.json."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(summary(results, settings), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def all_passed(results: Sequence[StationResult]) -> bool:
+    """Return whether every station passed, and there was one."""
+    return bool(results) and all(result.passed for result in results)
+
+
+def verdict_line(results: Sequence[StationResult]) -> str:
+    """Return how many stations verged, and by what that is confirmed."""
+    passed = sum(result.passed for result in results)
+    known = "" if all(result.photo is None for result in results) else ", as far as it is known"
+    return (
+        f"{passed} of {len(results)} stations verged, as reported by the graph and confirmed by the ground truth{known}"
+    )
 
 
 def _figure(value: float, digits: int) -> str:

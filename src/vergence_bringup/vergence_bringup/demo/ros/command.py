@@ -16,7 +16,7 @@ import yaml
 from vergence_bringup.demo.photo_report import write_overview
 from vergence_bringup.demo.photographs import CLICKS, SHORT_CLICKS, Photographs, open_photographs
 from vergence_bringup.demo.report import write_report
-from vergence_bringup.demo.result import StationResult, table, write_summary
+from vergence_bringup.demo.result import StationResult, all_passed, table, verdict_line, write_summary
 from vergence_bringup.demo.stations import Station, stations
 from vergence_bringup.demo.visits import Runner, visit_all
 from vergence_bringup.node_table import PHOTOGRAPHED
@@ -97,10 +97,9 @@ def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station], photograp
     write_report(options.out / "report.html", results, settings, options.out)
     print()
     print(table(results))
-    passed = sum(result.passed for result in results)
-    print(f"\n{passed} of {len(results)} stations verged, as reported by the graph and confirmed by the ground truth")
+    print(f"\n{verdict_line(results)}")
     print(f"report: {options.out / 'report.html'}   figures: {options.out / 'summary.json'}")
-    return 0 if results and passed == len(results) and not any(statuses.values()) else 1
+    return 0 if all_passed(results) and not any(statuses.values()) else 1
 
 
 @contextlib.contextmanager
