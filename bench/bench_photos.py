@@ -40,28 +40,30 @@ def run(say: Callable[[str], None], clicks: int | None = None) -> list[Row]:
     except NoPhotographsError as error:
         say(f"clicks on photographs skipped: {error}")
         return _scene_rows(say) + _disparity_rows(say, from_photographs=False)
-    outcomes = _outcomes(run_trial, photos_figures.trials(clicks), "clicks on photographs", say)
+    trials = photos_figures.trials(clicks)
+    outcomes = _outcomes(run_trial, trials, _TRIALS_OF_A_JOB, "clicks on photographs", say)
     for line in (*photos_figures.by_pair(outcomes), "", *photos_figures.reasons(outcomes)):
         say(line)
     return photos_figures.rows(outcomes, clicks) + _scene_rows(say) + _disparity_rows(say, from_photographs=True)
 
 
 def _scene_rows(say: Callable[[str], None]) -> list[Row]:
-    outcomes = _outcomes(photos_scenes.run, photos_scenes.trials(), "clicks in the room", say)
+    of_a_room = sum(photos_scenes.CLICKS_OF_A_ROOM.values())
+    outcomes = _outcomes(photos_scenes.run, photos_scenes.trials(), of_a_room, "clicks in rooms", say)
     for line in photos_scenes.failures(outcomes):
         say(line)
     return photos_scenes.rows(outcomes)
 
 
 def _outcomes(
-    run_one: Callable[[Trial], Outcome], trials: Sequence[Trial], what: str, say: Callable[[str], None]
+    run_one: Callable[[Trial], Outcome], trials: Sequence[Trial], of_a_job: int, what: str, say: Callable[[str], None]
 ) -> list[Outcome]:
-    """Run every trial in one of two processes; those that stand together share what a process keeps."""
+    """Run every trial in one of two processes, `of_a_job` after one another in the same: they share what it keeps."""
     began, said = time.monotonic(), 0
     outcomes: list[Outcome] = []
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(max_workers=_PROCESSES, mp_context=context) as pool:
-        for outcome in pool.map(run_one, trials, chunksize=_TRIALS_OF_A_JOB):
+        for outcome in pool.map(run_one, trials, chunksize=of_a_job):
             outcomes.append(outcome)
             if len(outcomes) >= said + len(trials) // 8 or len(outcomes) == len(trials):
                 said = len(outcomes)

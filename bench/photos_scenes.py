@@ -30,7 +30,7 @@ ROOMS = range(8)
 NEAREST_M, FARTHEST_M = 0.4, 1.5
 NARROWEST_PX, WIDEST_PX = 5.0, 15.0
 WIDTHS_M = {**THIN_WIDTHS_M, "marker": 2 * MARKER_RADIUS_M}
-_MARKERS_OF_A_ROOM, _THIN_OF_A_ROOM = 3, 4
+CLICKS_OF_A_ROOM = {MARKER: 3, THIN: 3}
 _AZIMUTH_RAD, _ELEVATION_RAD = math.radians(25.0), math.radians(12.0)
 _SETTLED_S = 1.0
 _COMING_FROM_RAD = math.radians(4.0)
@@ -86,10 +86,10 @@ def trials() -> list[SceneTrial]:
     """Return every click; those in one room stand together."""
     found: list[SceneTrial] = []
     for room in ROOMS:
-        for number in range(_MARKERS_OF_A_ROOM + _THIN_OF_A_ROOM):
+        kinds = [kind for kind, clicks in CLICKS_OF_A_ROOM.items() for _ in range(clicks)]
+        for number, kind in enumerate(kinds):
             seed = 100 * room + number
             random = np.random.default_rng([seed, 31])
-            kind = MARKER if number < _MARKERS_OF_A_ROOM else THIN
             thing, distance_m = _marker(random) if kind == MARKER else _thin(random)
             azimuth, elevation = (float(random.uniform(-most, most)) for most in (_AZIMUTH_RAD, _ELEVATION_RAD))
             x, y, z = place(distance_m, azimuth, elevation).tolist()
