@@ -19,6 +19,7 @@ from vergence_sim.photo.views import Padded, padded
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
 
+_FINEST = 1.25
 FOCAL_PER_WIDTH = 0.85
 """Focal length over image width that is assumed where none is given: a webcam's, about 61 degrees wide."""
 
@@ -70,9 +71,27 @@ class PhotoPair:
         self.cx_px = 0.5 * (self.width_px - 1) if cx_px is None else cx_px
         self.cy_px = 0.5 * (self.height_px - 1) if cy_px is None else cy_px
 
+    def seen_at(self, focal_px: float) -> tuple[Padded, Padded, Array]:
+        """Return both photographs, with a margin for views that reach beyond them, and their camera matrix (3, 3).
+
+        Much larger ones are reduced to views of this focal length: a view takes single pixels, so that their fine
+        texture would turn into noise.
+        """
+        scale = min(1.0, _FINEST * focal_px / self.fx_px)
+        size = max(round(scale * self.width_px), 1), max(round(scale * self.height_px), 1)
+        if size == (self.width_px, self.height_px):
+            return (*self._padded, self.matrix)
+        across, down = size[0] / self.width_px, size[1] / self.height_px
+        # Pixels are squares about whole coordinates, so that the picture's corner is at -0.5.
+        reduced = np.array([[across, 0.0, 0.5 * (across - 1)], [0.0, down, 0.5 * (down - 1)], [0.0, 0.0, 1.0]])
+        left, right = (
+            padded(np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8))
+            for image in (self.left, self.right)
+        )
+        return left, right, reduced @ self.matrix
+
     @cached_property
-    def padded(self) -> tuple[Padded, Padded]:
-        """Both photographs with a margin for views that reach beyond them."""
+    def _padded(self) -> tuple[Padded, Padded]:
         return padded(self.left), padded(self.right)
 
     @property

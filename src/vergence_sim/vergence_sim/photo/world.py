@@ -40,9 +40,10 @@ class PhotoWorld:
         cameras = {"left": self.rig.left_camera, "right": self.rig.right_camera}
         mounts = {"left": (p.left_camera.roll_rad, 0.0), "right": (p.right_camera.roll_rad, p.right_camera.pitch_rad)}
         self.lenses = {eye: Lens(camera, p.camera.distortion) for eye, camera in cameras.items()}
+        *photographs, matrix = pair.seen_at(self.rig.left_camera.fx_px)
         self._eyes = {
-            eye: PhotoEye(photograph, pair.matrix, self.lenses[eye], mount_rotation(*mounts[eye]))
-            for eye, photograph in zip(EYES, pair.padded, strict=True)
+            eye: PhotoEye(photograph, matrix, self.lenses[eye], mount_rotation(*mounts[eye]))
+            for eye, photograph in zip(EYES, photographs, strict=True)
         }
         seeds = np.random.SeedSequence(p.simulation.seed).spawn(2)
         self._sensors = {

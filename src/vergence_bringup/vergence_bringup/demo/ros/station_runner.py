@@ -178,7 +178,7 @@ class StationRunner:
             end=_table(after.edge),
             fixation_m=(fixation.x, fixation.y, fixation.z),
             target_m=(final.target_point.x, final.target_point.y, final.target_point.z),
-            series=_series(began_s, states, edges, truths, boxes),
+            series=_series(began_s, states, edges, truths, boxes if station.has_boxes else ()),
             start_box=before.box and BoxFigures.from_message(before.box),
             end_box=after.box and BoxFigures.from_message(after.box),
             photo=self._stage.photo_figures(station, final),
