@@ -19,9 +19,9 @@ _DISPARITIES = {
     MEASURED: "The disparities of the clicked points were measured by structured light by those who made the pair.",
     MATCHED: (
         "The disparities of the clicked points are not measured: they come from semi-global matching of the two "
-        "photographs (OpenCV's StereoSGBM, kept where both ways agree and no depth edge is near). On pairs with a "
-        "known truth about 3 in 100 of its disparities are wrong by more than 2 px, so that a disagreement may be the "
-        "matching's fault."
+        "photographs (OpenCV's StereoSGBM, kept where both ways agree and no depth edge is near). On "
+        "scikit-image's pair, whose truth is known, about 2 in 100 of these are wrong by more than 2 px (make bench "
+        "ONLY=photos), so that a disagreement may be the matching's fault."
     ),
 }
 
