@@ -47,7 +47,7 @@ def introduction(photographs: Mapping[str, Any]) -> str:
         "<p><b>Measured:</b> the eyes' true angles, which the simulated servos have; from them how far off the clicked "
         "ray the left eye rests, and the pixels of both photographs on which the eyes rest; the times from the goal to "
         "the first report of vergence and to the goal's result. Where the clicked point's disparity is known, the same "
-        f"for the right eye, and the vergence error. {_DISPARITIES[photographs['disparities_from']]} Where it is not "
+        f"for the right eye, and the vergence error. {_DISPARITIES[photographs['disparities_from']]} Where none is "
         "known, only the left eye is judged.</p>"
         f"<p><b>Not measured:</b> distances. The photographs' focal length, {photographs['assumed_focal_px']:g} px, "
         "and the baseline are assumed; another one shows a projectively changed scene. Beyond a photograph's frame a "
