@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from bench.gaze_runs import Scenario, Trace, travel_s
 from bench.results import OUT_DIR
 from vergence_bringup.demo.ros.recorder import Recorder, Stamped
-from vergence_bringup.demo.ros.stage import Stage, class_goal
+from vergence_bringup.demo.ros.stage import RoomStage, class_goal
 from vergence_bringup.ros.processes import ProcessGroup, config_dir
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
@@ -34,7 +34,7 @@ class ProcessHead:
 
     def __init__(self, recorder: Recorder, nodes: ProcessGroup, rig: Rig) -> None:
         self._recorder, self._check_alive, self._rig = recorder, nodes.check, rig
-        self._stage = Stage(recorder, nodes.check, ("target", "occluder"))
+        self._stage = RoomStage(recorder, nodes.check, ("target", "occluder"))
         self._joints = recorder.record(JointState, "ground_truth/joint_states", nodes.check)
         self._stage.wait_until_ready()
         recorder.wait_for("ground_truth/joint_states", lambda: self._joints, 40.0, nodes.check)

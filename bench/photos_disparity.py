@@ -8,16 +8,15 @@ import math
 import time
 from collections.abc import Iterable
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
-from bench.photos_data import KnownPoint, grey_pair, motorcycle_points, pair_names, targets
+from bench.photos_data import MOTORCYCLE, KnownPoint, grey_pair, motorcycle_points, pair_names, pair_of, targets
 from bench.results import Row
 from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
+from vergence_sim.photo.matching import matched_disparity, semi_global
 
-Image = npt.NDArray[np.uint8]
 Array = npt.NDArray[np.float64]
 
 POINTS = 1000
@@ -45,7 +44,7 @@ def rows(points: list[KnownPoint]) -> list[Row]:
     for name in names:
         left, right = grey_pair(name)
         began = time.perf_counter()
-        dense = _sgbm(left, right)
+        dense = semi_global(left, right)
         frame_s += time.perf_counter() - began
         for point in (p for p in points if p.pair == name):
             began = time.perf_counter()
@@ -59,6 +58,7 @@ def rows(points: list[KnownPoint]) -> list[Row]:
         *_accuracy(".motorcycle", exact),
         Row("photo.disparity.inside_2sigma", _inside_2sigma(exact), "of the motorcycle's that were answered"),
         Row("photo.disparity.confidence_ranks", _confidence_ranks(answers), "rank correlation with -error"),
+        *_matched_rows([point for point in points if point.exact]),
         Row("photo.disparity.cost", cost, f"of a frame of {_PEER}", _PEER, 1.0),
         Row("photo.disparity.point_ms", 1e3 * point_s / len(answers), "ms a point", _PEER, 1e3 * frame_s / len(names)),
     ]
@@ -74,6 +74,17 @@ def _accuracy(suffix: str, answers: list[tuple[KnownPoint, Disparity, float]]) -
         ("median_px", "px", lambda errors: float(np.nanmedian(np.abs(errors)))),
     )
     return [Row(f"photo.disparity.{n}{suffix}", m(ours), unit, _PEER, m(peer)) for n, unit, m in measures]
+
+
+def _matched_rows(points: list[KnownPoint]) -> list[Row]:
+    """Return the rows of what the demo compares with before photographs of which nothing was measured."""
+    pair = pair_of(MOTORCYCLE)
+    dense = matched_disparity(pair.left, pair.right)
+    errors = np.array([_at(dense, point) - point.disparity_px for point in points])
+    return [
+        Row("photo.matched.over_2px", _over(errors), "of those that the demo's matching answers, motorcycle"),
+        Row("photo.matched.answered", float(np.isfinite(errors).mean()), "of the motorcycle's points"),
+    ]
 
 
 def _over(errors: Array) -> float:
@@ -98,25 +109,6 @@ def _ranks(values: Array) -> Array:
     _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
     last = np.cumsum(counts)
     return np.asarray((last - 0.5 * (counts - 1))[which], np.float64)
-
-
-def _sgbm(left: Image, right: Image) -> Array:
-    """Return the disparity (h, w) [px] by semi-global matching in all directions, NaN where it has none."""
-    block = 5
-    matcher = cv2.StereoSGBM_create(  # type: ignore[attr-defined]  # missing in OpenCV's own type stubs
-        minDisparity=0,
-        numDisparities=128,
-        blockSize=block,
-        P1=8 * block**2,
-        P2=32 * block**2,
-        disp12MaxDiff=1,
-        uniquenessRatio=5,
-        speckleWindowSize=50,
-        speckleRange=2,
-        mode=cv2.STEREO_SGBM_MODE_HH,
-    )
-    fixed = matcher.compute(left, right)
-    return np.where(fixed >= 0, fixed / 16.0, np.nan)
 
 
 def _at(dense: Array, point: KnownPoint) -> float:

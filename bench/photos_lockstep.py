@@ -1,4 +1,4 @@
-"""The shipped metric and controller before a pair of photographs, in simulated time: no nodes, no sleeping.
+"""The shipped metric and controller before any lockstep world, in simulated time: no nodes, no sleeping.
 
 Images, joint reports and results take as long as through the running nodes: `camera.latency_s` from an exposure to its
 publication, `processing_s` for the metric, 2 ms for a joint report. What passes between metric and controller goes
@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -32,9 +32,8 @@ from vergence_rig.camera import CameraModel
 from vergence_rig.joint_history import JointHistory
 from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_sim.optics import Lens
-from vergence_sim.photo.pair import PhotoPoint
-from vergence_sim.photo.world import EYES, PhotoWorld
 from vergence_sim.real_time import Schedule
+from vergence_sim.world import EYES, World
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
@@ -59,12 +58,21 @@ class Trace:
     reason: list[str] = field(default_factory=list)
     first_result_s: float = math.inf
     start_errors_rad: tuple[float, float, float] = (math.nan, math.nan, math.nan)
-    outside_share: float = math.nan
 
     @property
     def largest_deg(self) -> Array:
         """The largest of the errors in version, tilt and vergence (n,)."""
         return np.maximum(np.abs(self.aside_deg), np.abs(self.vergence_deg))
+
+
+class Clickable(Protocol):
+    """A point of a world that can be clicked on in the left eye's image, and whose truth is known."""
+
+    def left_pixel(self) -> tuple[float, float]:
+        """Return the pixel (x, y), as the lens distorts it, at which the left eye sees it now."""
+
+    def errors_rad(self) -> tuple[float, float, float]:
+        """Return how much vergence, version and tilt are short of it now [rad]."""
 
 
 class MetricOfPairs:
@@ -117,7 +125,7 @@ class MetricOfPairs:
 class Lockstep:
     """World, metric and controller on one clock. `advance_to` lets all of them run; `on_step` sees every command."""
 
-    def __init__(self, world: PhotoWorld, rig: Rig, parameters: GazeParameters | None = None) -> None:
+    def __init__(self, world: World, rig: Rig, parameters: GazeParameters | None = None) -> None:
         self.world = world
         self.controller = GazeController(rig, parameters or gaze_parameters(), CONTROL_PERIOD_S)
         self.metric = MetricOfPairs(rig, world.lenses)
@@ -198,20 +206,20 @@ class Lockstep:
         self.on_step(command)
 
 
-def record(lockstep: Lockstep, point: PhotoPoint, duration_s: float, rest_s: float) -> Trace:
+def record(lockstep: Lockstep, point: Clickable, duration_s: float, rest_s: float) -> Trace:
     """Click on a point as the left eye sees it now and follow what happens; the trace ends after `duration_s`.
 
     It ends before that once `verged` has stood for `rest_s`.
     """
     world, trace = lockstep.world, Trace()
     began_s = world.time_s
-    trace.start_errors_rad = world.errors_to(point)
+    trace.start_errors_rad = point.errors_rad()
     verged_since_s = math.inf
 
     def note(command: Any) -> None:
         nonlocal verged_since_s
         now_s, report = world.time_s - began_s, command.report
-        vergence, version, tilt = (math.degrees(error) for error in world.errors_to(point))
+        vergence, version, tilt = (math.degrees(error) for error in point.errors_rad())
         if math.isinf(trace.first_result_s) and lockstep.newest_exposure_s >= began_s:
             trace.first_result_s = now_s
         trace.time_s.append(now_s)
@@ -222,11 +230,10 @@ def record(lockstep: Lockstep, point: PhotoPoint, duration_s: float, rest_s: flo
         trace.reason.append(report.reason)
         verged_since_s = min(verged_since_s, now_s) if report.verged else math.inf
 
-    lockstep.click(world.project("left", point))
+    lockstep.click(point.left_pixel())
     lockstep.on_step = note
     while world.time_s < began_s + duration_s - 1e-9 and world.time_s - began_s - verged_since_s < rest_s:
         lockstep.advance_to(world.time_s + CONTROL_PERIOD_S)
-    trace.outside_share = max(world.outside_share(eye) for eye in EYES)
     return trace
 
 

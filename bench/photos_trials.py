@@ -9,48 +9,29 @@ import numpy as np
 
 from bench.photos_data import Target, pair_of, photographs_rig
 from bench.photos_lockstep import Lockstep, Trace, record
+from bench.photos_verdict import DURATION_S, REST_S, Verdict, verdict_of
 from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_rig.servo import IDEAL
 from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.joints import Plant
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint
 from vergence_sim.photo.world import PhotoWorld
+from vergence_sim.world import EYES
 
-DURATION_S = 3.0
-REST_S = 0.5
-_AWAKE_S = 0.3
+AWAKE_S = 0.3
 _IN_VIEW_PX = 24.0
-_ASIDE_DEG, _VERGENCE_DEG = 0.35, 0.25
-_FALSE_ASIDE_DEG, _FALSE_VERGENCE_DEG = 1.0, 0.5
 _ZERO_RAD = math.radians(3.0)
 _SPARE_VERGENCE_RAD = math.radians(0.5)
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What came of a click: times in seconds, errors in degrees at the end; `declared_s` is inf if never."""
+class Outcome(Verdict):
+    """What came of a click on a photograph; `near_deg` is the vergence that the target needs."""
 
     target: Target
     setting: str
-    declared_s: float
-    falsely_verged: bool
-    aside_deg: float
-    vergence_deg: float
-    time_ratio: float
-    last_reason: str
-    last_phase: str
     outside_share: float
     near_deg: float
-
-    @property
-    def declared(self) -> bool:
-        """True if the eyes were ever declared verged."""
-        return math.isfinite(self.declared_s)
-
-    @property
-    def on_target(self) -> bool:
-        """True if they were, and rested on the point that was clicked."""
-        return self.declared and self.aside_deg <= _ASIDE_DEG and self.vergence_deg <= _VERGENCE_DEG
 
 
 def shipped_rig() -> Rig:
@@ -99,12 +80,12 @@ class Trial:
 
 def run(trial: Trial) -> Outcome:
     """Run a trial."""
-    trace, rig = trace_of(trial)
-    return outcome_of(trial, trace, rig)
+    trace, rig, outside_share = trace_of(trial)
+    return outcome_of(trial, trace, rig, outside_share)
 
 
-def trace_of(trial: Trial) -> tuple[Trace, Rig]:
-    """Run a trial and return its trace and the rig that was described."""
+def trace_of(trial: Trial) -> tuple[Trace, Rig, float]:
+    """Run a trial and return its trace, the rig that was described, and the share of padding in the view at the end."""
     cv2.setNumThreads(1)
     described, plant_of = SETTINGS[trial.setting]
     rig, pair, point = described(), pair_of(trial.target.pair), trial.target.point
@@ -121,65 +102,45 @@ def trace_of(trial: Trial) -> tuple[Trace, Rig]:
     }
     world.head.place(start_of(world, pair, point), 0.0, aside)
     lockstep = Lockstep(world, rig)
-    lockstep.advance_to(_AWAKE_S + float(random.uniform(0.0, 1.0 / parameters.camera.frame_rate_hz)))
-    return record(lockstep, point, DURATION_S, REST_S), rig
+    lockstep.advance_to(AWAKE_S + float(random.uniform(0.0, 1.0 / parameters.camera.frame_rate_hz)))
+    trace = record(lockstep, PointOfPhotograph(world, point), DURATION_S, REST_S)
+    return trace, rig, max(world.outside_share(eye) for eye in EYES)
+
+
+class PointOfPhotograph:
+    """A point of the photographs, to click on."""
+
+    def __init__(self, world: PhotoWorld, point: PhotoPoint) -> None:
+        self._world, self._point = world, point
+
+    def left_pixel(self) -> tuple[float, float]:
+        """See `Clickable`."""
+        return self._world.project("left", self._point)
+
+    def errors_rad(self) -> tuple[float, float, float]:
+        """See `Clickable`."""
+        return self._world.errors_to(self._point)
 
 
 def start_of(world: PhotoWorld, pair: PhotoPair, point: PhotoPoint) -> dict[str, float]:
-    """Return straight ahead, or the pose next to it from which both eyes see the point.
-
-    The right eye turns with the left one, so that the vergence at the start says nothing of the target.
-    """
-    camera, wanted = world.rig.left_camera, pair.fixation(point)
+    """Return the pose, by joint name, from which the eyes begin."""
+    camera = world.rig.left_camera
     # A zero that is off turns the eyes aside of what their driver reports.
     margin_px = _IN_VIEW_PX + camera.fx_px * max(map(abs, world.head.plant.zero_rad.values()), default=0.0)
-    across = math.atan((0.5 * camera.width_px - margin_px) / camera.fx_px)
-    down = math.atan((0.5 * camera.height_px - margin_px) / camera.fy_px)
-    pans = wanted.pan_left_rad, wanted.pan_right_rad
-    pan = min(max(0.0, max(pans) - across), min(pans) + across)
-    tilt = min(max(0.0, wanted.tilt_rad - down), wanted.tilt_rad + down)
-    return {"pan_left": pan, "pan_right": pan, "tilt": tilt}
+    return pair.start_towards(point, camera, margin_px).as_dict()
 
 
-def outcome_of(trial: Trial, trace: Trace, rig: Rig) -> Outcome:
-    """Return what a trace shows."""
-    verged, times = np.array(trace.verged), np.array(trace.time_s)
-    aside, vergence = np.abs(trace.aside_deg), np.abs(trace.vergence_deg)
-    declared = np.flatnonzero(verged)
-    false = verged & ((aside > _FALSE_ASIDE_DEG) | (vergence > _FALSE_VERGENCE_DEG))
+def outcome_of(trial: Trial, trace: Trace, rig: Rig, outside_share: float) -> Outcome:
+    """Return what a trace shows; `outside_share` is that of the worse view at its end."""
     target = trial.target
     fixation = pair_of(target.pair).fixation(target.point)
     return Outcome(
+        **vars(verdict_of(trace, rig)),
         target=target,
         setting=trial.setting,
-        declared_s=float(times[declared[0]]) if declared.size else math.inf,
-        falsely_verged=bool(false.any()),
-        aside_deg=float(aside[-1]),
-        vergence_deg=float(vergence[-1]),
-        time_ratio=_arrived_s(trace, rig) / _bound_s(trace, rig),
-        last_reason=trace.reason[-1],
-        last_phase=trace.phase[-1],
-        outside_share=trace.outside_share,
+        outside_share=outside_share,
         near_deg=math.degrees(fixation.vergence_rad),
     )
-
-
-def _arrived_s(trace: Trace, rig: Rig) -> float:
-    """Return from when on all errors stay within the pan servos' dead band (0.25 degrees if they have none) [s]."""
-    tolerance = math.degrees(rig.pan_left.servo.dead_band_rad) or 0.25
-    outside = np.flatnonzero(trace.largest_deg > tolerance)
-    if outside.size == 0:
-        return trace.time_s[0]
-    return math.inf if outside[-1] + 1 >= len(trace.time_s) else trace.time_s[outside[-1] + 1]
-
-
-def _bound_s(trace: Trace, rig: Rig) -> float:
-    """Return the soonest possible [s]: first result of a pair after the click, the servos' latency and travel."""
-    vergence, version, tilt = trace.start_errors_rad
-    ways = np.abs([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
-    servos = [joint.servo for _, joint in rig.joints.items()]
-    travel_s = float((ways / [servo.speed_rad_s for servo in servos]).max())
-    return trace.first_result_s + max(servo.command_latency_s for servo in servos) + travel_s
 
 
 def with_setting(trial: Trial, setting: str) -> Trial:

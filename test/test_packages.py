@@ -22,6 +22,8 @@ ROSDEP_KEYS = {
 NO_ROSDEP_KEY = {"mujoco", "onnx"}
 OF_ONE_DRIVER = {"adafruit_pca9685", "board", "busio", "lgpio", "pigpio"}
 """Imported only where the servos of that driver are."""
+IF_INSTALLED = {"skimage"}
+"""Imported only where it is installed, and not needed."""
 LAUNCHED = {path.name for path in PACKAGES}
 """What vergence_bringup starts, whether it imports it or not."""
 
@@ -44,7 +46,7 @@ def imports(files: list[Path]) -> Iterator[str]:
 
 
 def needs(files: list[Path], package: str) -> set[str]:
-    modules = set(imports(files)) - {package} - NO_ROSDEP_KEY - OF_ONE_DRIVER
+    modules = set(imports(files)) - {package} - NO_ROSDEP_KEY - OF_ONE_DRIVER - IF_INSTALLED
     return {ROSDEP_KEYS.get(module, module) for module in modules}
 
 

@@ -67,6 +67,20 @@ def test_the_truth_follows_the_eyes_to_the_point(graph: Any, photo: PhotoNode) -
     assert abs(other.version_error_rad) > math.radians(5)
 
 
+def test_of_a_point_of_unknown_depth_the_left_eye_is_known(graph: Any, photographs: dict[str, str]) -> None:
+    values: dict[str, Any] = {"points_px": POINTS[:3], "rays_px": POINTS[3:5], "point": 1}
+    graph.start(PhotoNode, **photographs, **values, **{"camera.frame_rate_hz": 10.0})
+    truth = graph.wait(graph.message(TrueVergence, "ground_truth/vergence"))
+    assert truth.target == "point 1"
+    # The pixel (200, 300) of 741x500 px, with both eyes straight ahead.
+    left, focal_px = 200 - 370, 0.85 * 741
+    assert truth.left_error_rad == pytest.approx(math.atan(math.hypot(left, 300 - 249.5) / focal_px), abs=2e-3)
+    assert truth.elevation_error_rad == pytest.approx(math.atan((300 - 249.5) / focal_px), abs=2e-3)
+    assert truth.left_visible_share == 1.0
+    unknown = ("vergence_error_rad", "version_error_rad", "right_error_rad", "right_visible_share", "right_x_px")
+    assert all(math.isnan(getattr(truth, name)) for name in unknown)
+
+
 @pytest.mark.parametrize(
     ("values", "words"),
     [
@@ -75,6 +89,7 @@ def test_the_truth_follows_the_eyes_to_the_point(graph: Any, photo: PhotoNode) -
         ({"right": "SMALLER"}, "both photographs must have one size: left is 741x500, right is 74x50 px"),
         ({"points_px": [900.0, 10.0, 5.0]}, "a point must lie inside both photographs of 741x500 px: got x 900"),
         ({"points_px": [1.0, 2.0]}, "points_px"),
+        ({"rays_px": [1.0, 2.0, 3.0]}, "rays_px"),
         ({"points_px": POINTS, "point": 2}, "parameter 'point' must be less than 2"),
         ({"left": None}, "parameter 'left' must be"),
     ],

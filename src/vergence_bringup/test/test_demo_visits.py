@@ -103,7 +103,7 @@ def test_the_command_writes_summary_and_report_either_way(failures, status, monk
     monkeypatch.setenv("ROS_DOMAIN_ID", "0")
     monkeypatch.setattr(demo, "environment", dict)
     monkeypatch.setattr(demo, "_runner", scripted)
-    monkeypatch.setattr(demo, "_commands", lambda options: {})
+    monkeypatch.setattr(demo, "_commands", lambda *_: {})
     assert main(["demo", "--short", "--out", str(tmp_path)]) == status
     stored = json.loads((tmp_path / "summary.json").read_text())
     assert stored["passed"] is (status == 0)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from vergence_bringup.commands.doctor import examine
-from vergence_bringup.node_table import NODES, REAL, SIMULATED, graph
+from vergence_bringup.node_table import NODES, PHOTOGRAPHED, REAL, SIMULATED, graph
 from vergence_bringup.ros.simulated_head import FRAME_RATE_HZ, LEFT_OUT, simulated_head
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -43,6 +43,7 @@ def test_a_pair_that_is_spelled_by_hand_is_found(text):
 def test_every_graph_has_one_source_of_images_and_every_node_behind_it():
     behind = {"edge_metric_node", "box_metric_node", "eye_rotation_node", "gaze_controller_node"}
     assert set(graph(SIMULATED)) == behind | {"sim_node"}
+    assert set(graph(PHOTOGRAPHED)) == behind | {"photo_node"}
     assert set(graph(REAL)) == behind | {"camera_node", "servo_node"}
 
 
@@ -55,6 +56,9 @@ def test_the_simulated_head_is_the_graph_but_what_is_left_out_by_name_on_one_rig
         assert (command.parameters or {})["rig"] == str(tmp_path / "rig.yaml")
     parameters = commands["sim_node"].parameters or {}
     assert (parameters["seed"], parameters["camera.frame_rate_hz"]) == (3, FRAME_RATE_HZ)
+    before = simulated_head(tmp_path / "rig.yaml", PHOTOGRAPHED, left="a.png")
+    assert set(before) == set(commands) - {"sim_node"} | {"photo_node"}
+    assert (before["photo_node"].parameters or {})["left"] == "a.png"
 
 
 def test_the_doctor_looks_for_every_node(monkeypatch):

@@ -9,6 +9,7 @@ from vergence_bringup.figures.pictures import (
     read_image,
     with_box,
     with_cross,
+    with_ring,
     with_windows,
     write_image,
 )
@@ -47,6 +48,11 @@ def test_drawing_leaves_the_picture_alone():
     assert framed[39, 49].any()
     assert not framed[19, 29].any()
     assert with_cross(picture)[30, 40].any()
+    assert not with_cross(picture, (10.4, 5.6))[30, 40].any()
+    assert with_cross(picture, (10.4, 5.6))[6, 10].any()
+    assert with_ring(picture, (40.0, 30.0))[30, 49].any()
+    assert not with_ring(picture, (40.0, 30.0))[30, 40].any()
+    assert not with_ring(picture, (float("nan"), 30.0), "unknown").any()
     boxed = with_box(picture, (10.2, 20.4, 40.0, 50.0), "cube")
     assert boxed[20:51, 10].all()
     assert not boxed[25:45, 15:35].any()

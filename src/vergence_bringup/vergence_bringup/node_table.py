@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from vergence_rig.parameters import Groups
 
-REAL, SIMULATED = "real", "simulated"
+REAL, SIMULATED, PHOTOGRAPHED = "real", "simulated", "photographed"
 
 
 @dataclass(frozen=True)
@@ -15,12 +15,12 @@ class NodeEntry:
     Attributes:
         package: the ROS package that holds its executable.
         groups: its parameter groups, as "module:NAME" of a `Groups`.
-        heads: the kinds of head whose graph it belongs to: REAL, SIMULATED, both or none.
+        heads: the kinds of head whose graph it belongs to: REAL, SIMULATED, PHOTOGRAPHED (before photographs).
     """
 
     package: str
     groups: str
-    heads: tuple[str, ...] = (REAL, SIMULATED)
+    heads: tuple[str, ...] = (REAL, SIMULATED, PHOTOGRAPHED)
 
 
 NODES: dict[str, NodeEntry] = {
@@ -29,14 +29,14 @@ NODES: dict[str, NodeEntry] = {
     "edge_metric_node": NodeEntry("vergence_metric", "vergence_metric.measurement.parameters:GROUPS"),
     "eye_rotation_node": NodeEntry("vergence_metric", "vergence_metric.eye_rotation.parameters:GROUPS"),
     "gaze_controller_node": NodeEntry("vergence_gaze", "vergence_gaze.parameter_groups:GROUPS"),
-    "photo_node": NodeEntry("vergence_sim", "vergence_sim.photo.parameters:GROUPS", heads=()),
+    "photo_node": NodeEntry("vergence_sim", "vergence_sim.photo.parameters:GROUPS", heads=(PHOTOGRAPHED,)),
     "servo_node": NodeEntry("vergence_servo", "vergence_servo.parameters:GROUPS", heads=(REAL,)),
     "sim_node": NodeEntry("vergence_sim", "vergence_sim.parameters:GROUPS", heads=(SIMULATED,)),
 }
 
 
 def graph(head: str) -> tuple[str, ...]:
-    """Return the executables of the whole graph of a REAL or a SIMULATED head."""
+    """Return the executables of the whole graph of a REAL, a SIMULATED or a PHOTOGRAPHED head."""
     return tuple(executable for executable, entry in NODES.items() if head in entry.heads)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vergence_rig.geometry import gaze_for_point
+from vergence_rig.rig import JOINT_NAMES, CameraSpec
 from vergence_sim.photo.pair import PhotoError, PhotoPair, PhotoPoint, read_pair
 
 GREY = np.full((240, 320, 3), 90, np.uint8)
@@ -28,6 +29,36 @@ def test_the_fixation_of_a_point_is_that_of_its_place_in_space():
     assert found.as_dict() == pytest.approx(wanted.as_dict(), abs=1e-12)
     assert found.vergence_rad > 0
     assert found.tilt_rad > 0
+
+
+def test_what_lies_on_the_axes_is_what_is_fixated():
+    pair, point = PhotoPair(GREY, GREY, 300.0), PhotoPoint(250.0, 40.0, 33.0)
+    left, right = pair.on_axes(pair.fixation(point))
+    assert left == pytest.approx((250.0, 40.0))
+    assert right == pytest.approx((217.0, 40.0))
+
+
+def test_without_a_disparity_only_the_left_eye_and_the_tilt_are_known():
+    pair, point = PhotoPair(GREY, GREY), PhotoPoint(250.0, 40.0)
+    known, unknown = pair.fixation(PhotoPoint(250.0, 40.0, 33.0)), pair.fixation(point)
+    assert not point.depth_known
+    assert (unknown.pan_left_rad, unknown.tilt_rad) == (known.pan_left_rad, known.tilt_rad)
+    assert math.isnan(unknown.pan_right_rad)
+    pair.check(point)
+    with pytest.raises(PhotoError, match="a point must lie inside both photographs"):
+        pair.check(PhotoPoint(-1, 5))
+
+
+def test_the_start_is_straight_ahead_or_shows_the_point():
+    pair, camera = PhotoPair(GREY, GREY, 150.0), CameraSpec(width_px=240, height_px=160, fx_px=300.0, fy_px=300.0)
+    assert pair.start_towards(PhotoPoint(160.0, 120.0, 5.0), camera, 20.0).as_dict() == dict.fromkeys(JOINT_NAMES, 0.0)
+    for point in (PhotoPoint(20.0, 10.0), PhotoPoint(300.0, 230.0, 60.0)):
+        start, wanted = pair.start_towards(point, camera, 20.0), pair.fixation(point)
+        assert start.vergence_rad == 0.0
+        assert abs(wanted.pan_left_rad - start.pan_left_rad) <= math.atan(100 / 300) + 1e-12
+        assert abs(wanted.tilt_rad - start.tilt_rad) <= math.atan(60 / 300) + 1e-12
+        if point.depth_known:
+            assert abs(wanted.pan_right_rad - start.pan_right_rad) <= math.atan(100 / 300) + 1e-12
 
 
 @pytest.mark.parametrize(

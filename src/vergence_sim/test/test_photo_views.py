@@ -13,8 +13,9 @@ from vergence_sim.optics import Lens
 from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint
 from vergence_sim.photo.views import PhotoEye, mount_rotation, padded
-from vergence_sim.photo.world import EYES, PhotoWorld, cropped
+from vergence_sim.photo.world import PhotoWorld, cropped
 from vergence_sim.simulator import Simulator
+from vergence_sim.world import EYES
 
 CAMERA = CameraSpec(width_px=480, height_px=320, cx_px=239.5, cy_px=159.5)
 DISTORTION = (-0.04, 0.02, 0.0, 0.0, 0.0)
@@ -39,6 +40,26 @@ def test_straight_ahead_a_camera_like_the_photographs_sees_its_middle(pair):
     eye = PhotoEye(padded(pair.left), pair.matrix, Lens(camera, (0.0,) * 5), np.eye(3))
     assert np.array_equal(eye.view(0.0, 0.0), pair.left[60:380, 116:596])
     assert eye.outside_share(0.0, 0.0) == 0.0
+
+
+def test_a_large_photograph_is_seen_as_a_small_one_of_the_same_scene(pair):
+    left, right = (
+        cv2.resize(image, None, fx=5, fy=5, interpolation=cv2.INTER_CUBIC) for image in (pair.left, pair.right)
+    )
+    worlds = [ideal_world(pair), ideal_world(PhotoPair(left, right, 5 * 542.0))]
+    for world in worlds:
+        world.head.place({"pan_left": 0.1, "pan_right": 0.05, "tilt": -0.06})
+    for eye in EYES:
+        small, big = (world.view(eye).astype(float) for world in worlds)
+        assert np.abs(small - big).mean() < 1.5
+        assert worlds[1].outside_share(eye) == pytest.approx(worlds[0].outside_share(eye), abs=0.01)
+
+
+def test_texture_too_fine_for_a_view_is_no_noise():
+    fine = np.random.default_rng(3).integers(0, 256, (2200, 3560, 3), dtype=np.uint8)
+    world = ideal_world(PhotoPair(fine, fine))
+    # Areas of about 4.5 by 4.5 px are averaged: without that the deviation would be about 70.
+    assert world.view("left").std() < 25
 
 
 @pytest.mark.parametrize(("pan", "tilt"), [(0.1, 0.0), (-0.12, 0.05), (0.05, -0.08)])

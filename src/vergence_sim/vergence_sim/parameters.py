@@ -7,7 +7,7 @@ from typing import Any
 from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError, parameter
 from vergence_sim.camera_parameters import CameraParameters, LeftCameraParameters, RightCameraParameters
 
-TARGETS = ("cube", "marker")
+TARGETS = ("cube", "marker", "straw", "cable", "stick")
 DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
 MOTIONS = ("static", "step", "ramp", "sinusoid", "stations")
 _MOST_EXTRA_CUBES, _MOST_LOOK_ALIKES = 3, 6

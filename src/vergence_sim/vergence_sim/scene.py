@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -12,11 +13,14 @@ from vergence_sim.model_builder import HIDDEN_GROUP, ModelBuilder
 from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.pictures import book_cover, cube_faces, look_alike_faces
 from vergence_sim.room import Room
-from vergence_sim.surfaces import Image, cloth, shaded
+from vergence_sim.surfaces import Image, cloth, shaded, wood
 
 HEAD_HEIGHT_M = 1.15
 CUBE_SIDE_M = 0.057
 MARKER_LENGTH_M, MARKER_RADIUS_M = 0.14, 0.010
+THIN_LENGTH_M = 0.24
+THIN_WIDTHS_M = {"straw": 0.006, "cable": 0.011, "stick": 0.020}
+"""Upright round targets whose images are 5 to 15 px wide within reach, by name."""
 EXTRA_CUBES = ("cube2", "cube3", "cube4")
 DISTRACTOR_SIDE_M = 0.06
 OBJECTS = (*TARGETS, "occluder", "distractor", *EXTRA_CUBES)
@@ -49,7 +53,7 @@ class SceneBuilder(ModelBuilder):
         cap: tuple[float, float, float] = (0.1, 0.15, 0.6)
         self.movable(
             "marker",
-            *self._barrel(radius, -0.5 * length, 0.26 * length),
+            *self._stacked("marker", radius, (-0.5 * length, 0.26 * length), self._pen_labels(length, radius)),
             self.shape("cylinder", (0, 0, 0.36 * length), (1.15 * radius, 0.14 * length), cap, name="marker_cap"),
             self.shape(
                 "cylinder", (0, 0, 0.2 * length), (1.18 * radius, 0.02 * length), (0.9, 0.9, 0.88), name="marker_ring"
@@ -67,20 +71,47 @@ class SceneBuilder(ModelBuilder):
         alike = self._wrapped("distractor", look_alike_faces(np.random.default_rng([self._seed, 10]), kind=kind))
         self.movable("distractor", self.shape("box", (0, 0, 0), (side, side, side), alike, name="distractor"))
 
-    def _barrel(self, radius: float, low: float, high: float) -> list[str]:
-        """Return a pen's barrel from short pieces: a cube map is undistorted only on a piece as high as wide."""
-        pieces = max(1, round((high - low) / (2 * radius)))
-        half = 0.5 * (high - low) / pieces
-        shapes = []
-        for number in range(pieces):
-            name = f"marker{number}"
-            label = self._wrapped(
-                name, [_pen_label(np.random.default_rng([self._seed, 3, number, face])) for face in range(6)]
+    def thin(self) -> None:
+        """Add upright things a few pixels wide, movable: a striped straw, a cable with marks, a wooden stick."""
+        rng, half = np.random.default_rng([self._seed, 11]), THIN_LENGTH_M / 2
+        radii = {name: width / 2 for name, width in THIN_WIDTHS_M.items()}
+        paper, ink = (0.9, 0.9, 0.88), _colour(rng, 0.1, 0.65)
+        self.movable("straw", *self._stacked("straw", radii["straw"], (-half, half), [paper, ink] * 10))
+        sheath, mark = _colour(rng, 0.12, 0.25), _colour(rng, 0.6, 0.9)
+        places = rng.uniform(-0.95 * half, 0.95 * half, 12).tolist()
+        marks = [
+            self.shape("cylinder", (0, 0, z), (1.02 * radii["cable"], 0.0015), mark, name=f"cable_mark{number}")
+            for number, z in enumerate(places)
+        ]
+        self.movable("cable", *self._stacked("cable", radii["cable"], (-half, half), [sheath]), *marks)
+        grain = [
+            self._wrapped(f"stick_wood{kind}", [np.rot90(wood(rng, (96, 96), (80, 130, 175))) for _ in range(6)])
+            for kind in range(3)
+        ]
+        self.movable("stick", *self._stacked("stick", radii["stick"], (-half, half), grain * 4))
+
+    def _stacked(
+        self, name: str, radius: float, ends: tuple[float, float], looks: Sequence[str | tuple[float, float, float]]
+    ) -> list[str]:
+        """Return an upright cylinder between two heights, in one piece a look, a texture's name or a colour RGB.
+
+        A texture is undistorted only on a piece as high as wide.
+        """
+        low, half = ends[0], 0.5 * (ends[1] - ends[0]) / len(looks)
+        return [
+            self.shape("cylinder", (0, 0, low + (2 * number + 1) * half), (radius, half), look, name=f"{name}{number}")
+            for number, look in enumerate(looks)
+        ]
+
+    def _pen_labels(self, length: float, radius: float) -> list[str]:
+        """Return the textures of the pieces of a pen's barrel."""
+        return [
+            self._wrapped(
+                f"marker{number}",
+                [_pen_label(np.random.default_rng([self._seed, 3, number, face])) for face in range(6)],
             )
-            shapes.append(
-                self.shape("cylinder", (0, 0, low + (2 * number + 1) * half), (radius, half), label, name=name)
-            )
-        return shapes
+            for number in range(max(1, round(0.76 * length / (2 * radius))))
+        ]
 
     def crowd(self, extra_cubes: int, look_alikes: int) -> None:
         """Add more Rubik's cubes on the table, and objects that share their colours or their pattern."""
@@ -170,6 +201,11 @@ def _named(shapes: str, eye: str) -> str:
     return shapes.replace('name="', f'name="{eye}_')
 
 
+def _colour(rng: np.random.Generator, darkest: float, lightest: float) -> tuple[float, float, float]:
+    red, green, blue = rng.uniform(darkest, lightest, 3).tolist()
+    return red, green, blue
+
+
 def _pen_label(rng: np.random.Generator) -> Image:
     """Return one side of a piece of a pen's barrel (128, 128, 3): white, with coloured print."""
     barrel = shaded((215, 220, 222), np.zeros((128, 128), np.float32))
@@ -196,6 +232,7 @@ def _compiled(
     builder = SceneBuilder(rig, seed, samples, textured)
     # Near things first: what is drawn behind them is never textured.
     builder.targets()
+    builder.thin()
     builder.distractor(distractor)
     builder.crowd(extra_cubes, look_alikes)
     builder.furniture()

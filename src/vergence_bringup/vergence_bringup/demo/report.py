@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from vergence_bringup.demo.result import Series, StationResult
+from vergence_bringup.demo import photo_report
+from vergence_bringup.demo.result import Series, StationResult, verdict_line
 from vergence_bringup.figures.boxes import CORNERS, signed
 from vergence_bringup.figures.svg_plot import Line, plot
 
@@ -28,15 +29,16 @@ figure { margin: 0; } figure img { width: 100%; display: block; } figcaption { f
 
 def write_report(path: Path, results: Sequence[StationResult], settings: dict[str, Any], out_dir: Path) -> None:
     """Write the report; images are read from `out_dir`/pictures, where the demo wrote them."""
-    passed = sum(result.passed for result in results)
     parts = [
         "<!doctype html><html lang='en'><head><meta charset='utf-8'><title>Vergence demo</title>",
         f"<style>{_STYLE}</style></head><body><h1>Vergence demo</h1>",
-        f"<p>{passed} of {len(results)} stations verged, as reported by the graph and confirmed by the ground truth. "
+        f"<p>{verdict_line(results)}. "
         f"Servos: {html.escape(str(settings['servo']))}, cameras: {html.escape(str(settings['cameras']))}, "
         f"{settings['duration_s']:g} s in all.</p>",
-        _overview(results),
     ]
+    if "photographs" in settings:
+        parts += [photo_report.introduction(settings["photographs"]), _photographs(out_dir / "pictures")]
+    parts.append(_overview(results))
     parts += [_station(result, out_dir / "pictures") for result in results]
     parts.append("</body></html>\n")
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -47,9 +49,10 @@ def _overview(results: Sequence[StationResult]) -> str:
     rows = []
     for result in results:
         verdict = _verdict(result.reported_verged, "verged", "not verged")
-        truth = _verdict(result.truth_agrees, "agrees", "disagrees")
+        truth = _verdict(result.truth_agrees, result.truth_text.lower(), result.truth_text.lower())
         rows.append(
             f"<tr><td><a href='#{result.name}'>{result.name}</a></td><td>{verdict}</td><td>{truth}</td>"
+            f"<td>{html.escape(result.answer) or '-'}</td><td>{_text(result.answer_s)} s</td>"
             f"<td>{_text(result.time_s)} s</td><td>{_text(result.true_error_deg)}&deg;</td>"
             f"<td>{_text(result.tolerance_deg)}&deg;</td><td>{_text(result.off_axis_deg)}&deg;</td></tr>"
         )
@@ -57,6 +60,8 @@ def _overview(results: Sequence[StationResult]) -> str:
         "station",
         "reported",
         "ground truth",
+        "goal's result",
+        "after",
         "time to vergence",
         "vergence error",
         "tolerance",
@@ -88,13 +93,10 @@ def _station(result: StationResult, pictures: Path) -> str:
         ],
     )
     figures = [vergence, metric, *_box_plot(series)]
-    place = ", ".join(_text(value) for value in result.target_m)
-    fixation = ", ".join(_text(value) for value in result.fixation_m)
     reason = f"<p class='bad'>{html.escape(result.reason)}</p>" if result.reason else ""
     return "\n".join(
         (
-            f"<h2 id='{result.name}'>{result.name}</h2><p>{html.escape(result.title)}. True target point ({place}) m; "
-            f"the graph's estimate ({fixation}) m.</p>{reason}",
+            f"<h2 id='{result.name}'>{result.name}</h2><p>{html.escape(result.title)}. {_place(result)}</p>{reason}",
             *(_pictures(result.name, moment, caption, pictures) for moment, caption in _MOMENTS),
             f"<div class='two'>{''.join(figures)}</div>",
             _metric_table(result),
@@ -104,6 +106,21 @@ def _station(result: StationResult, pictures: Path) -> str:
 
 
 _MOMENTS = (("start", "before"), ("end", "at the end"))
+
+
+def _place(result: StationResult) -> str:
+    if result.photo is not None:
+        return photo_report.about(result.photo)
+    place, fixation = (", ".join(_text(value) for value in point) for point in (result.target_m, result.fixation_m))
+    return f"True target point ({place}) m; the graph's estimate ({fixation}) m."
+
+
+def _photographs(folder: Path) -> str:
+    figures = (
+        _figure(folder / f"photographs_{eye}.jpg", f"{eye} photograph; rings: clicked points, crosses: eyes at rest")
+        for eye in ("left", "right")
+    )
+    return f"<div class='two'>{''.join(figures)}</div>"
 
 
 def _pictures(name: str, moment: str, caption: str, folder: Path) -> str:
@@ -116,15 +133,17 @@ def _pictures(name: str, moment: str, caption: str, folder: Path) -> str:
     )
     figures = []
     for kind, text, suffix in shown:
-        file = folder / f"{name}_{moment}_{kind}.{suffix}"
-        if not file.is_file():
-            continue  # the station was not completed
-        mime = "jpeg" if suffix == "jpg" else "png"
-        data = base64.b64encode(file.read_bytes()).decode("ascii")
-        figures.append(
-            f"<figure><img alt='{text}' src='data:image/{mime};base64,{data}'><figcaption>{text}</figcaption></figure>"
-        )
+        figures.append(_figure(folder / f"{name}_{moment}_{kind}.{suffix}", text))
     return f"<div class='row'>{''.join(figures)}</div>"
+
+
+def _figure(file: Path, text: str) -> str:
+    """Return a picture with its caption; nothing where the file is missing: its station was not completed."""
+    if not file.is_file():
+        return ""
+    mime = "jpeg" if file.suffix == ".jpg" else "png"
+    data = base64.b64encode(file.read_bytes()).decode("ascii")
+    return f"<figure><img alt='{text}' src='data:image/{mime};base64,{data}'><figcaption>{text}</figcaption></figure>"
 
 
 def _box_plot(series: Series) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from vergence_bringup.demo.photographs import PhotoFigures
 from vergence_bringup.demo.stations import Station
 from vergence_bringup.figures.boxes import BoxFigures, corner_text, signed
 
@@ -58,6 +59,8 @@ class StationResult:
         true_error_deg: median magnitude of the true vergence error during the hold.
         off_axis_deg: angle between the target point and the optical axis of the worse eye, median.
         tolerance_deg, off_axis_tolerance_deg: the largest of these that count as vergence.
+        photo: where the eyes came to rest on photographs; None in a room.
+        answer, answer_s: the result of the goal by its name in LookAt.action, and the time to it.
     """
 
     name: str
@@ -77,12 +80,28 @@ class StationResult:
     series: Series
     start_box: BoxFigures | None = None
     end_box: BoxFigures | None = None
+    photo: PhotoFigures | None = None
+    answer: str = ""
+    answer_s: float = math.nan
+
+    @property
+    def depth_known(self) -> bool:
+        """False for a point of photographs whose disparity is not known: the truth is the left eye's alone."""
+        return self.photo is None or self.photo.point.depth_known
 
     @property
     def truth_agrees(self) -> bool:
-        """True if by the ground truth both eyes are on the target."""
+        """True if by the ground truth both eyes are on the target; the left one, where no more is known."""
         # NaN compares false: an unknown truth never agrees.
-        return self.true_error_deg <= self.tolerance_deg and self.off_axis_deg <= self.off_axis_tolerance_deg
+        verged = self.true_error_deg <= self.tolerance_deg or not self.depth_known
+        return verged and self.off_axis_deg <= self.off_axis_tolerance_deg
+
+    @property
+    def truth_text(self) -> str:
+        """What the ground truth says, in two words at most."""
+        if not self.truth_agrees:
+            return "DISAGREES"
+        return "agrees" if self.depth_known else "left agrees"
 
     @property
     def passed(self) -> bool:
@@ -126,7 +145,7 @@ def _numbers(values: Sequence[float]) -> list[float | None]:
 def summary(results: Sequence[StationResult], settings: dict[str, Any]) -> dict[str, Any]:
     """Return the content of summary.json; unknown figures are null."""
     return {
-        "passed": bool(results) and all(result.passed for result in results),
+        "passed": all_passed(results),
         **settings,
         "stations": [
             {
@@ -135,6 +154,8 @@ def summary(results: Sequence[StationResult], settings: dict[str, Any]) -> dict[
                 "verged": result.reported_verged,
                 "truth_agrees": result.truth_agrees,
                 "reason": result.reason,
+                "result": result.answer,
+                "result_s": _number(result.answer_s),
                 "time_s": _number(result.time_s),
                 "true_error_deg": _number(result.true_error_deg),
                 "tolerance_deg": _number(result.tolerance_deg),
@@ -155,9 +176,20 @@ def summary(results: Sequence[StationResult], settings: dict[str, Any]) -> dict[
                 },
                 "fixation_point_m": _numbers(result.fixation_m),
                 "target_point_m": _numbers(result.target_m),
+                "photo": result.photo and _photo(result.photo),
             }
             for result in results
         ],
+    }
+
+
+def _photo(figures: PhotoFigures) -> dict[str, Any]:
+    return {
+        "clicked_px": [figures.point.x_px, figures.point.y_px],
+        "disparity_px": _number(figures.point.disparity_px),
+        "disparity_from": figures.source,
+        "rests_px": {eye: _numbers(pixel) for eye, pixel in zip(("left", "right"), figures.rests_px, strict=True)},
+        "verged_disparity_px": _number(figures.verged_disparity_px),
     }
 
 
@@ -167,6 +199,20 @@ def write_summary(path: Path, results: Sequence[StationResult], settings: dict[s
     path.write_text(json.dumps(summary(results, settings), indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
+def all_passed(results: Sequence[StationResult]) -> bool:
+    """Return whether every station passed, and there was one."""
+    return bool(results) and all(result.passed for result in results)
+
+
+def verdict_line(results: Sequence[StationResult]) -> str:
+    """Return how many stations verged, and by what that is confirmed."""
+    passed = sum(result.passed for result in results)
+    known = "" if all(result.photo is None for result in results) else ", as far as it is known"
+    return (
+        f"{passed} of {len(results)} stations verged, as reported by the graph and confirmed by the ground truth{known}"
+    )
+
+
 def _figure(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 
@@ -174,20 +220,19 @@ def _figure(value: float, digits: int) -> str:
 def table(results: Sequence[StationResult]) -> str:
     """Return the terminal's table: verdicts, metric I at start and end for every window, and metric II."""
     lines = [
-        f"{'station':16} {'reported':10} {'truth':9} {'time':>6} {'true error':>11} {'off axis':>9}   metric in px"
+        f"{'station':16} {'reported':10} {'truth':11} {'time':>6} {'true error':>11} {'off axis':>9}   metric in px"
     ]
     for result in results:
         reported = "verged" if result.reported_verged else "NOT VERGED"
-        truth = "agrees" if result.truth_agrees else "DISAGREES"
         lines.append(
-            f"{result.name:16} {reported:10} {truth:9} {_figure(result.time_s, 2):>5}s"
+            f"{result.name:16} {reported:10} {result.truth_text:11} {_figure(result.time_s, 2):>5}s"
             f" {_figure(result.true_error_deg, 2):>7} deg {_figure(result.off_axis_deg, 2):>5} deg"
             f"   window {' '.join(f'{size:>6}' for size in result.start.windows_px)}"
         )
         for label, metric in (("start", result.start), ("end", result.end)):
             for arrow, values in (("L to R", metric.left_to_right_px), ("R to L", metric.right_to_left_px)):
                 figures = " ".join(f"{_figure(value, 2):>6}" for value in values)
-                lines.append(f"{'':71}{label:>5} {arrow} {figures}".rstrip())
+                lines.append(f"{'':73}{label:>5} {arrow} {figures}".rstrip())
         for label, box in (("start", result.start_box), ("end", result.end_box)):
             if box is not None:
                 lines.append(f"{'':17}boxes {label:>5} {_box_text(box)}")

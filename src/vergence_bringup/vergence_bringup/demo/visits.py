@@ -52,9 +52,8 @@ def visit_all(
 def _verdict(result: StationResult) -> str:
     reported = "verged" if result.reported_verged else f"NOT verged ({result.reason})"
     took = f" after {result.time_s:.2f} s" if math.isfinite(result.time_s) else ""
-    truth = "agrees" if result.truth_agrees else "DISAGREES"
     error = f"{result.true_error_deg:.2f}" if math.isfinite(result.true_error_deg) else "unknown"
-    return f"reported {reported}{took}; ground truth {truth}: vergence error {error} degrees"
+    return f"reported {reported}{took}; ground truth {result.truth_text}: vergence error {error} degrees"
 
 
 def _first_line(error: Exception) -> str:

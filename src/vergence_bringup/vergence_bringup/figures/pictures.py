@@ -1,5 +1,6 @@
 """Images of pairs and their edges, for files and reports."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -55,12 +56,25 @@ def with_windows(picture: Image, windows_px: Sequence[int]) -> Image:
     return framed
 
 
-def with_cross(picture: Image) -> Image:
-    """Return a copy with a cross at the image's centre."""
+def with_cross(picture: Image, at_px: tuple[float, float] | None = None) -> Image:
+    """Return a copy with a cross at a pixel (x, y), the image's centre where none is given."""
     marked = picture.copy()
-    centre = (marked.shape[1] // 2, marked.shape[0] // 2)
+    centre = (marked.shape[1] // 2, marked.shape[0] // 2) if at_px is None else (round(at_px[0]), round(at_px[1]))
     cv2.drawMarker(marked, centre, (0, 0, 0), cv2.MARKER_CROSS, 25, 3)
     cv2.drawMarker(marked, centre, (80, 255, 255), cv2.MARKER_CROSS, 23, 1)
+    return marked
+
+
+def with_ring(picture: Image, at_px: tuple[float, float], label: str = "") -> Image:
+    """Return a copy with a ring around a pixel (x, y) and a label beside it; without them where the pixel is NaN."""
+    marked = picture.copy()
+    if not all(map(math.isfinite, at_px)):
+        return marked
+    centre = (round(at_px[0]), round(at_px[1]))
+    for colour, thickness in (((0, 0, 0), 4), (_INK_BGR, 2)):
+        cv2.circle(marked, centre, 9, colour, thickness, cv2.LINE_AA)
+    if label:
+        _write(marked, label, (centre[0] + 14, centre[1] - 6))
     return marked
 
 
@@ -70,9 +84,14 @@ def with_box(picture: Image, xyxy_px: Sequence[float], label: str) -> Image:
     x_min, y_min, x_max, y_max = (round(value) for value in xyxy_px)
     cv2.rectangle(marked, (x_min, y_min), (x_max, y_max), (0, 0, 0), 3)
     cv2.rectangle(marked, (x_min, y_min), (x_max, y_max), _INK_BGR, 1)
-    (width, height), _ = cv2.getTextSize(label, _FONT, 0.42, 1)
-    x, y = x_min, max(y_min - 6, height + 3)
-    # A filled background: OpenCV 5 spaces an outline of the same text differently.
-    cv2.rectangle(marked, (x - 2, y - height - 3), (x + width + 2, y + 3), (0, 0, 0), -1)
-    cv2.putText(marked, label, (x, y), _FONT, 0.42, _INK_BGR, 1, cv2.LINE_AA)
+    _write(marked, label, (x_min, y_min - 6))
     return marked
+
+
+def _write(picture: Image, label: str, at_px: tuple[int, int]) -> None:
+    """Write a label into a picture, its lower left corner at a pixel (x, y) or as near as it fits."""
+    (width, height), _ = cv2.getTextSize(label, _FONT, 0.42, 1)
+    x, y = at_px[0], max(at_px[1], height + 3)
+    # A filled background: OpenCV 5 spaces an outline of the same text differently.
+    cv2.rectangle(picture, (x - 2, y - height - 3), (x + width + 2, y + 3), (0, 0, 0), -1)
+    cv2.putText(picture, label, (x, y), _FONT, 0.42, _INK_BGR, 1, cv2.LINE_AA)

@@ -12,12 +12,14 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vergence_rig.geometry import EyeAngles
+from vergence_rig.geometry import EyeAngles, eye_direction
+from vergence_rig.rig import CameraSpec
 from vergence_sim.photo.views import Padded, padded
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
 
+_FINEST = 1.25
 FOCAL_PER_WIDTH = 0.85
 """Focal length over image width that is assumed where none is given: a webcam's, about 61 degrees wide."""
 
@@ -28,11 +30,19 @@ class PhotoError(ValueError):
 
 @dataclass(frozen=True)
 class PhotoPoint:
-    """A pixel (x, y) of the left photograph and its disparity x_left - x_right [px]."""
+    """A pixel (x, y) of the left photograph and its disparity x_left - x_right [px], NaN where it is not known.
+
+    Without a disparity only the left eye's ray, and with it the tilt, is known; what needs the right one's is NaN.
+    """
 
     x_px: float
     y_px: float
-    disparity_px: float
+    disparity_px: float = math.nan
+
+    @property
+    def depth_known(self) -> bool:
+        """True if the disparity is known."""
+        return math.isfinite(self.disparity_px)
 
 
 class PhotoPair:
@@ -61,9 +71,27 @@ class PhotoPair:
         self.cx_px = 0.5 * (self.width_px - 1) if cx_px is None else cx_px
         self.cy_px = 0.5 * (self.height_px - 1) if cy_px is None else cy_px
 
+    def seen_at(self, focal_px: float) -> tuple[Padded, Padded, Array]:
+        """Return both photographs, with a margin for views that reach beyond them, and their camera matrix (3, 3).
+
+        Much larger ones are reduced to views of this focal length: a view takes single pixels, so that their fine
+        texture would turn into noise.
+        """
+        scale = min(1.0, _FINEST * focal_px / self.fx_px)
+        size = max(round(scale * self.width_px), 1), max(round(scale * self.height_px), 1)
+        if size == (self.width_px, self.height_px):
+            return (*self._padded, self.matrix)
+        across, down = size[0] / self.width_px, size[1] / self.height_px
+        # Pixels are squares about whole coordinates, so that the picture's corner is at -0.5.
+        reduced = np.array([[across, 0.0, 0.5 * (across - 1)], [0.0, down, 0.5 * (down - 1)], [0.0, 0.0, 1.0]])
+        left, right = (
+            padded(np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8))
+            for image in (self.left, self.right)
+        )
+        return left, right, reduced @ self.matrix
+
     @cached_property
-    def padded(self) -> tuple[Padded, Padded]:
-        """Both photographs with a margin for views that reach beyond them."""
+    def _padded(self) -> tuple[Padded, Padded]:
         return padded(self.left), padded(self.right)
 
     @property
@@ -84,11 +112,33 @@ class PhotoPair:
         forward = math.hypot(1.0, up)
         return EyeAngles(math.atan2(left, forward), math.atan2(right, forward), math.atan2(-up, 1.0))
 
+    def on_axes(self, angles: EyeAngles) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return the pixels (x, y), (x, y) of the left and the right photograph on the eyes' pan directions."""
+        pixels = []
+        for pan in (angles.pan_left_rad, angles.pan_right_rad):
+            x, y, z = eye_direction(pan, angles.tilt_rad).tolist()
+            pixels.append((self.cx_px - self.fx_px * y / x, self.cy_px - self.fx_px * z / x))
+        return pixels[0], pixels[1]
+
+    def start_towards(self, point: PhotoPoint, camera: CameraSpec, margin_px: float) -> EyeAngles:
+        """Return parallel eyes straight ahead, or the nearest such pose that shows a point to the eyes.
+
+        It is shown at least `margin_px` from the border of an image of `camera`; a point without a disparity to the
+        left eye alone. As the right eye turns with the left one, the vergence at the start says nothing of the point.
+        """
+        wanted = self.fixation(point)
+        across = math.atan((0.5 * camera.width_px - margin_px) / camera.fx_px)
+        down = math.atan((0.5 * camera.height_px - margin_px) / camera.fy_px)
+        pans = (wanted.pan_left_rad, wanted.pan_right_rad) if point.depth_known else (wanted.pan_left_rad,)
+        pan = min(max(0.0, max(pans) - across), min(pans) + across)
+        tilt = min(max(0.0, wanted.tilt_rad - down), wanted.tilt_rad + down)
+        return EyeAngles(pan, pan, tilt)
+
     def check(self, point: PhotoPoint) -> None:
         """Raise PhotoError for a point outside either photograph."""
         right_x = point.x_px - point.disparity_px
         inside = 0 <= point.x_px <= self.width_px - 1 and 0 <= point.y_px <= self.height_px - 1
-        if not (inside and 0 <= right_x <= self.width_px - 1):
+        if not (inside and (0 <= right_x <= self.width_px - 1 or not point.depth_known)):
             raise PhotoError(
                 f"a point must lie inside both photographs of {self.width_px}x{self.height_px} px: got "
                 f"x {point.x_px:g}, y {point.y_px:g}, disparity {point.disparity_px:g} (x {right_x:g} in the right one)"

@@ -68,8 +68,20 @@ class PhotoParameters(Parameters):
         maximum=1e5,
         read_only=True,
     )
+    rays_px: tuple[float, ...] = parameter(
+        (),
+        "points of unknown depth: x and y in the left photograph, two numbers a point. The truth about them is the "
+        "left eye's; what needs their disparity is NaN",
+        unit="px",
+        minimum=-1e5,
+        maximum=1e5,
+        read_only=True,
+    )
     point: int = parameter(
-        0, "number of the point of points_px, from 0, that ground_truth/* is about", minimum=0, maximum=100000
+        0,
+        "number of the point that ground_truth/* is about, from 0: those of points_px, then those of rays_px",
+        minimum=0,
+        maximum=100000,
     )
     rig: str = parameter("", "path of rig.yaml; empty for the built-in rig", read_only=True)
     preset: str = parameter(
@@ -86,15 +98,20 @@ class PhotoParameters(Parameters):
     )
 
     def check(self) -> None:
-        """Hold the points to whole triples."""
+        """Hold the points to whole triples and pairs."""
         if len(self.points_px) % 3:
             raise ParameterError("points_px", self.points_px, "three numbers, x y disparity, for every point")
+        if len(self.rays_px) % 2:
+            raise ParameterError("rays_px", self.rays_px, "two numbers, x y, for every point")
 
     @property
     def points(self) -> tuple[PhotoPoint, ...]:
-        """The points whose depth is known."""
-        numbers = self.points_px
-        return tuple(PhotoPoint(*numbers[i : i + 3]) for i in range(0, len(numbers), 3))
+        """The points whose depth is known, then those of which only the left eye's ray is."""
+        known, rays = self.points_px, self.rays_px
+        return (
+            *(PhotoPoint(*known[i : i + 3]) for i in range(0, len(known), 3)),
+            *(PhotoPoint(*rays[i : i + 2]) for i in range(0, len(rays), 2)),
+        )
 
 
 @dataclass(frozen=True)

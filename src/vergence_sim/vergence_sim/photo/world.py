@@ -13,10 +13,9 @@ from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.joints import PhotoHead, Plant
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint
 from vergence_sim.photo.views import PhotoEye, mount_rotation
+from vergence_sim.world import EYES
 
 Image = npt.NDArray[np.uint8]
-
-EYES = ("left", "right")
 
 
 class PhotoWorld:
@@ -41,9 +40,10 @@ class PhotoWorld:
         cameras = {"left": self.rig.left_camera, "right": self.rig.right_camera}
         mounts = {"left": (p.left_camera.roll_rad, 0.0), "right": (p.right_camera.roll_rad, p.right_camera.pitch_rad)}
         self.lenses = {eye: Lens(camera, p.camera.distortion) for eye, camera in cameras.items()}
+        *photographs, matrix = pair.seen_at(self.rig.left_camera.fx_px)
         self._eyes = {
-            eye: PhotoEye(photograph, pair.matrix, self.lenses[eye], mount_rotation(*mounts[eye]))
-            for eye, photograph in zip(EYES, pair.padded, strict=True)
+            eye: PhotoEye(photograph, matrix, self.lenses[eye], mount_rotation(*mounts[eye]))
+            for eye, photograph in zip(EYES, photographs, strict=True)
         }
         seeds = np.random.SeedSequence(p.simulation.seed).spawn(2)
         self._sensors = {

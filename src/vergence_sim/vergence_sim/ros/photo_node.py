@@ -20,8 +20,9 @@ from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.joints import Plant
 from vergence_sim.photo.pair import PhotoPoint, read_pair
 from vergence_sim.photo.parameters import GROUPS, PhotoParameters, PlantParameters, sim_parameters
-from vergence_sim.photo.world import EYES, PhotoWorld, cropped
+from vergence_sim.photo.world import PhotoWorld, cropped
 from vergence_sim.ros.real_time_node import RealTimeNode
+from vergence_sim.world import EYES
 
 
 class PhotoNode(RealTimeNode):
@@ -75,7 +76,10 @@ class PhotoNode(RealTimeNode):
 
 
 def _true_vergence(stamp: Any, world: PhotoWorld, point: PhotoPoint, name: str) -> TrueVergence:
-    """Return the truth about a point; its place is where both rays meet from eyes the rig's baseline apart."""
+    """Return the truth about a point; its place is where both rays meet from eyes the rig's baseline apart.
+
+    What needs a disparity that is not known is NaN.
+    """
     wanted, joints = world.pair.fixation(point), world.true_joints()
     try:
         place = point_at(wanted.version_rad, wanted.vergence_rad, wanted.tilt_rad, world.rig.baseline_m)
@@ -87,7 +91,7 @@ def _true_vergence(stamp: Any, world: PhotoWorld, point: PhotoPoint, name: str) 
         eye: float(np.arccos(np.clip(eye_direction(joints[f"pan_{eye}"], joints["tilt"]) @ _unit(ray), -1.0, 1.0)))
         for eye, ray in zip(EYES, world.pair.rays(point), strict=True)
     }
-    seen = {eye: float(_shows(world.lenses[eye].camera, pixels[eye])) for eye in EYES}
+    seen = {eye: _shows(world.lenses[eye].camera, pixels[eye]) for eye in EYES}
     x, y, z = (float(value) for value in place)
     return TrueVergence(
         header=Header(stamp=stamp, frame_id="rig_base"),
@@ -111,8 +115,11 @@ def _true_vergence(stamp: Any, world: PhotoWorld, point: PhotoPoint, name: str) 
     )
 
 
-def _shows(camera: CameraSpec, pixel: tuple[float, float]) -> bool:
-    return 0 <= pixel[0] <= camera.width_px - 1 and 0 <= pixel[1] <= camera.height_px - 1
+def _shows(camera: CameraSpec, pixel: tuple[float, float]) -> float:
+    """Return 1 for a pixel in the image, 0 for one outside, NaN for one that is not known."""
+    if not all(map(math.isfinite, pixel)):
+        return math.nan
+    return float(0 <= pixel[0] <= camera.width_px - 1 and 0 <= pixel[1] <= camera.height_px - 1)
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:

@@ -5,10 +5,8 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, Protocol
+from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
@@ -20,46 +18,10 @@ from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import to_stamp
 from vergence_rig.parameters import Groups
 from vergence_rig.rig import JOINT_NAMES
-from vergence_sim.optics import Lens
 from vergence_sim.parameters import SimParameters
 from vergence_sim.real_time import Event, Schedule
 from vergence_sim.ros.sim_messages import camera_info, joint_state
-
-Picture = npt.NDArray[np.uint8]
-
-EYES = ("left", "right")
-
-
-class World(Protocol):
-    """A head and what it sees, in lockstep."""
-
-    parameters: SimParameters
-    time_s: float
-
-    @property
-    def lenses(self) -> Mapping[str, Lens]:
-        """The lenses of both eyes."""
-
-    def set_parameters(self, parameters: SimParameters) -> None:
-        """Change the parameters that are not fixed at the start."""
-
-    def command(self, angles_rad: Mapping[str, float], now_s: float | None = None) -> None:
-        """Command joints by name [rad]."""
-
-    def advance_to(self, time_s: float) -> None:
-        """Let time pass until `time_s`."""
-
-    def expose(self, eye: str) -> Callable[[], Picture]:
-        """Expose one eye now; what is returned makes the picture of it."""
-
-    def joint_states(self) -> dict[str, float]:
-        """Return the joint angles as a driver without feedback publishes them [rad]."""
-
-    def true_joints(self) -> dict[str, float]:
-        """Return where the shafts really are [rad]."""
-
-    def close(self) -> None:
-        """Free what the world holds."""
+from vergence_sim.world import EYES, Picture, World
 
 
 class RealTimeNode(Node):

@@ -11,9 +11,10 @@ from vergence_common.parameters import ParameterSet
 from vergence_msgs.msg import TrueBoxes, TrueVergence
 from vergence_rig.rig import load_rig
 from vergence_sim.parameters import GROUPS, SimParameters
-from vergence_sim.ros.real_time_node import EYES, RealTimeNode
+from vergence_sim.ros.real_time_node import RealTimeNode
 from vergence_sim.ros.sim_messages import true_boxes, true_vergence
 from vergence_sim.simulator import Simulator
+from vergence_sim.world import EYES
 
 
 class SimNode(RealTimeNode):

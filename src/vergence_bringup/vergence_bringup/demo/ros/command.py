@@ -1,4 +1,4 @@
-"""`vergence demo`: the graph on the simulated head, every node as a process, and a report."""
+"""`vergence demo`: the graph on a simulated head, in a room or before photographs, as processes, and a report."""
 
 import argparse
 import contextlib
@@ -9,13 +9,17 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import yaml
 
+from vergence_bringup.demo.photo_report import write_overview
+from vergence_bringup.demo.photographs import CLICKS, SHORT_CLICKS, Photographs, open_photographs
 from vergence_bringup.demo.report import write_report
-from vergence_bringup.demo.result import StationResult, table, write_summary
+from vergence_bringup.demo.result import StationResult, all_passed, table, verdict_line, write_summary
 from vergence_bringup.demo.stations import Station, stations
 from vergence_bringup.demo.visits import Runner, visit_all
+from vergence_bringup.node_table import PHOTOGRAPHED
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir, environment
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
@@ -25,7 +29,16 @@ from vergence_rig.rig import Rig, load_rig
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the subcommand."""
     parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder of the report (default: out/demo)")
-    parser.add_argument("--short", action="store_true", help="three stations instead of eight")
+    parser.add_argument(
+        "--photos",
+        nargs="*",
+        metavar=("LEFT", "RIGHT"),
+        help="photographs of a rectified stereo pair as the world: both eyes look at points of them; without paths "
+        "scikit-image's stereo pair",
+    )
+    parser.add_argument(
+        "--short", action="store_true", help="three stations instead of eight, or instead of six of photographs"
+    )
     parser.add_argument("--ideal", action="store_true", help="ideal servos and cameras instead of realistic ones")
     parser.add_argument("--station", action="append", metavar="NAME", help="only this station (may be repeated)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the simulator's noise (default: 0)")
@@ -34,9 +47,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the demo; 0 only if every station was reported verged and the ground truth agrees."""
     rig = load_rig(config_dir() / "rig.yaml")
-    chosen = stations(rig.baseline_m, options.short)
+    short = options.short and not options.station
+    photographs: Photographs | None = None
+    if options.photos is not None:
+        photographs = open_photographs(options.photos, options.out, SHORT_CLICKS if short else CLICKS)
+    chosen = stations(rig.baseline_m, short) if photographs is None else photographs.stations(rig)
     if options.station:
-        known = {station.name: station for station in stations(rig.baseline_m)}
+        known = {station.name: station for station in chosen}
         for name in options.station:
             if name not in known:
                 raise ValueError(f"--station must be one of {', '.join(known)}: got {name!r}")
@@ -49,18 +66,18 @@ def run(options: argparse.Namespace) -> int:
             # Separate from every other head on this machine.
             os.environ["ROS_DOMAIN_ID"] = str(stack.enter_context(own_domain()))
             _say(f"to watch from another shell: source env.sh; export ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
-        return _run(options, rig, chosen)
+        return _run(options, rig, chosen, photographs)
 
 
-def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station]) -> int:
+def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station], photographs: Photographs | None) -> int:
     started = time.monotonic()
     results: list[StationResult] = []
-    commands = _commands(options)
+    commands = _commands(options, photographs)
     _say(f"starting {', '.join(commands)} (logs in {options.out / 'log'})")
     with ProcessGroup(log_dir=options.out / "log") as processes:
         for name, command in commands.items():
             processes.start(name, command)
-        with _runner(options, rig, processes.check) as runner:
+        with _runner(options, rig, photographs, processes.check) as runner:
             visit_all(runner, chosen, results, _say)
         _say("stopping the nodes")
         statuses = processes.stop()
@@ -68,38 +85,51 @@ def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station]) -> int:
         if status != 0:
             _say(f"{name} ended with status {status}: see {options.out / 'log' / name}.log")
 
-    settings = {
+    settings: dict[str, Any] = {
         "servo": "ideal" if options.ideal else "sg90",
         "cameras": "ideal" if options.ideal else "realistic",
         "duration_s": round(time.monotonic() - started, 1),
     }
+    if photographs is not None:
+        settings["photographs"] = photographs.as_json()
+        write_overview(photographs.pair, results, options.out / "pictures")
     write_summary(options.out / "summary.json", results, settings)
     write_report(options.out / "report.html", results, settings, options.out)
     print()
     print(table(results))
-    passed = sum(result.passed for result in results)
-    print(f"\n{passed} of {len(results)} stations verged, as reported by the graph and confirmed by the ground truth")
+    print(f"\n{verdict_line(results)}")
     print(f"report: {options.out / 'report.html'}   figures: {options.out / 'summary.json'}")
-    return 0 if results and passed == len(results) and not any(statuses.values()) else 1
+    return 0 if all_passed(results) and not any(statuses.values()) else 1
 
 
 @contextlib.contextmanager
-def _runner(options: argparse.Namespace, rig: Rig, check_alive: Callable[[], None]) -> Iterator[Runner]:
+def _runner(
+    options: argparse.Namespace, rig: Rig, photographs: Photographs | None, check_alive: Callable[[], None]
+) -> Iterator[Runner]:
     # Imported late: rclpy reads the middleware's environment when it is loaded.
+    from vergence_bringup.demo.ros.photo_stage import PhotoStage
     from vergence_bringup.demo.ros.recorder import Recorder
+    from vergence_bringup.demo.ros.stage import RoomStage, Stage
     from vergence_bringup.demo.ros.station_runner import StationRunner, tolerance_deg
 
     recorder = Recorder()
     try:
-        yield StationRunner(recorder, check_alive, rig, tolerance_deg(rig, options.ideal), options.out)
+        stage: Stage
+        if photographs is None:
+            stage = RoomStage(recorder, check_alive, ("target", "distractor"))
+        else:
+            stage = PhotoStage(recorder, check_alive, photographs)
+        yield StationRunner(recorder, check_alive, stage, rig, tolerance_deg(rig, options.ideal), options.out)
     finally:
         recorder.close()
 
 
-def _commands(options: argparse.Namespace) -> dict[str, NodeCommand]:
-    if options.ideal:
-        return simulated_head(_ideal_rig(options.out), seed=options.seed, preset="ideal")
-    return simulated_head(config_dir() / "rig.yaml", seed=options.seed)
+def _commands(options: argparse.Namespace, photographs: Photographs | None) -> dict[str, NodeCommand]:
+    rig = _ideal_rig(options.out) if options.ideal else config_dir() / "rig.yaml"
+    world: dict[str, object] = {"seed": options.seed, "preset": "ideal" if options.ideal else "realistic"}
+    if photographs is None:
+        return simulated_head(rig, **world)
+    return simulated_head(rig, PHOTOGRAPHED, **world, **photographs.parameters)
 
 
 def _ideal_rig(out_dir: Path) -> Path:

@@ -161,7 +161,8 @@ class Recorder:
         self._in_executor(self._subscribe_to_images, check_alive)
 
         def matched() -> tuple[Image, Image, EdgeVergence, BoxVergence | None] | None:
-            boxes = {_pair_key(entry.message): entry.message for entry in self.boxes[first_box:]}
+            arrived = self.boxes[first_box:] if with_boxes else ()
+            boxes = {_pair_key(entry.message): entry.message for entry in arrived}
             for left, right, edge in self._edge_pairs():
                 box = boxes.get(_pair_key(edge))
                 if box is None and boxes and time.monotonic() > same_pair_until_s:

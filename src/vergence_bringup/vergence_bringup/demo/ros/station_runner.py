@@ -1,7 +1,8 @@
-"""One station of the demo: place the target, click on it, record the eyes, compare with the ground truth."""
+"""One station of the demo: show the target, click on it, record the eyes, compare with the ground truth."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,15 @@ from vergence_bringup.demo.ros.recorder import Recorder, Stamped, StereoPicture
 from vergence_bringup.demo.ros.stage import Stage, class_goal
 from vergence_bringup.demo.stations import Station
 from vergence_bringup.figures.boxes import BoxFigures
-from vergence_bringup.figures.pictures import Image, combined_edges, with_box, with_cross, with_windows, write_image
+from vergence_bringup.figures.pictures import (
+    Image,
+    combined_edges,
+    with_box,
+    with_cross,
+    with_ring,
+    with_windows,
+    write_image,
+)
 from vergence_common.stamps import to_seconds
 from vergence_metric.measurement.edge_metric import EdgeMetric
 from vergence_msgs.action import LookAt
@@ -31,18 +40,23 @@ def tolerance_deg(rig: Rig, ideal: bool) -> float:
 
 
 class StationRunner:
-    """Visits stations one after the other; `check_alive` raises when a node has ended."""
+    """Visits stations of a stage one after the other; `check_alive` raises when a node has ended."""
 
     def __init__(
-        self, recorder: Recorder, check_alive: Callable[[], None], rig: Rig, tolerance_deg: float, out_dir: Path
+        self,
+        recorder: Recorder,
+        check_alive: Callable[[], None],
+        stage: Stage,
+        rig: Rig,
+        tolerance_deg: float,
+        out_dir: Path,
     ) -> None:
-        self._recorder = recorder
+        self._recorder, self._stage = recorder, stage
         self._check_alive = check_alive
         self._rig = rig
         self._tolerance_deg = tolerance_deg
         self._out_dir = out_dir
         self._edge_metric = EdgeMetric()
-        self._stage = Stage(recorder, check_alive, ("target", "distractor"))
 
     def wait_until_ready(self) -> None:
         """Wait until every node publishes."""
@@ -62,61 +76,56 @@ class StationRunner:
             math.radians(station.start_tilt_deg),
         )
         recorder.set_parameters("gaze_controller_node", {"mode": station.mode}, self._check_alive)
-        recorder.set_parameters("sim_node", {"target.object": station.target}, self._check_alive)
-        if station.distractor_m:
-            self._stage.put("distractor", station.distractor_m)
-        self._stage.put("target", station.place_m or self._fixation_m())
+        self._stage.show(station)
         shown_at = recorder.now_s()
         truth = recorder.wait_for(
             f"{station.target} in both views", lambda: self._seen(station, shown_at), 10.0, self._check_alive
         )
         before = recorder.picture(station.has_boxes, self._check_alive)
-        self._store(station, "start", before)
+        self._store(station, "start", before, truth)
 
         began = recorder.now_s()
         marks = len(recorder.states), len(recorder.edges), len(recorder.truths), len(recorder.boxes)
         goal = class_goal(station.target, _LIMIT_S) if station.by_class else _click(truth)
         result = recorder.look_at(goal, self._check_alive, _LIMIT_S + 10.0)
-        reason = "" if result.result == LookAt.Result.VERGED else result.reason
+        answer = _answer(result.result)
+        reason = "" if result.result == LookAt.Result.VERGED else result.reason or answer
         if station.moving:
-            recorder.set_parameters("sim_node", dict(station.motion), self._check_alive)
+            self._stage.set_moving(station, True)
             # The target starts at full speed: the eyes get a second to reach it before the hold begins.
             recorder.settle(_ACQUIRE_S, self._check_alive)
         recorder.settle(station.hold_s, self._check_alive)
         after = recorder.picture(station.has_boxes, self._check_alive)
-        self._store(station, "end", after)
+        self._store(station, "end", after, recorder.truths[-1].message)
         if station.moving:
-            recorder.set_parameters("sim_node", {"motion.kind": "static"}, self._check_alive)
-        return self._result(station, began, marks, reason, before, after)
-
-    def _fixation_m(self) -> Sequence[float]:
-        """Return the fixation point (3,) [m] that the controller reports while the eyes rest."""
-        now = self._recorder.now_s()
-        entry = self._recorder.wait_for(
-            "gaze/fixation_point from gaze_controller_node",
-            lambda: next((entry for entry in self._recorder.fixations[-1:] if entry.arrival_s >= now), None),
-            5.0,
-            self._check_alive,
-        )
-        point = entry.message.point
-        return point.x, point.y, point.z
+            self._stage.set_moving(station, False)
+        outcome = self._result(station, began, marks, reason, before, after)
+        return replace(outcome, answer=answer, answer_s=float(result.time_s))
 
     def _seen(self, station: Station, since_s: float) -> Any:
         entry = self._recorder.truths[-1]
         truth = entry.message
         exposed_s = to_seconds(truth.header.stamp)
         inside = truth.target == station.target and exposed_s > since_s
-        return truth if inside and min(truth.left_visible_share, truth.right_visible_share) > 0.2 else None
+        # NaN compares false: what the right eye sees of a point of unknown depth is not known.
+        hidden = truth.left_visible_share <= 0.2 or truth.right_visible_share <= 0.2
+        return truth if inside and not hidden else None
 
-    def _store(self, station: Station, moment: str, picture: StereoPicture) -> None:
+    def _store(self, station: Station, moment: str, picture: StereoPicture, truth: Any) -> None:
         folder = self._out_dir / "pictures"
         measured = self._edge_metric.measure(picture.left_bgr, picture.right_bgr)
         windows = [int(size) for size in picture.edge.windows_px]
         left, right = measured.left_edges.mask, measured.right_edges.mask
         name = f"{station.name}_{moment}"
         boxes = (None, None) if picture.box is None else (picture.box.left, picture.box.right)
-        for eye, view, box in zip(("left", "right"), (picture.left_bgr, picture.right_bgr), boxes, strict=True):
-            write_image(folder / f"{name}_{eye}.jpg", with_cross(_boxed(view, box)))
+        clicked = ((truth.left_x_px, truth.left_y_px), (truth.right_x_px, truth.right_y_px))
+        for eye, view, box, place in zip(
+            ("left", "right"), (picture.left_bgr, picture.right_bgr), boxes, clicked, strict=True
+        ):
+            drawn = with_cross(_boxed(view, box))
+            if self._stage.photo_figures(station, truth) is not None:
+                drawn = with_ring(with_windows(drawn, [round(2 * _FOVEA_HALF_PX)]), place)
+            write_image(folder / f"{name}_{eye}.jpg", drawn)
         write_image(folder / f"{name}_left_edges.png", left)
         write_image(folder / f"{name}_right_edges.png", right)
         write_image(folder / f"{name}_combined.png", with_windows(combined_edges(left, right), windows))
@@ -160,9 +169,8 @@ class StationRunner:
             reason=reason,
             time_s=reported_at_s - began_s,
             true_error_deg=_median_deg([truth.vergence_error_rad for truth in end_truths]),
-            off_axis_deg=max(
-                _median_deg([truth.left_error_rad for truth in end_truths]),
-                _median_deg([truth.right_error_rad for truth in end_truths]),
+            off_axis_deg=_largest_known(
+                _median_deg([getattr(truth, f"{eye}_error_rad") for truth in end_truths]) for eye in ("left", "right")
             ),
             tolerance_deg=self._tolerance_deg,
             off_axis_tolerance_deg=math.degrees(math.atan(_FOVEA_HALF_PX / self._rig.left_camera.fx_px)),
@@ -170,9 +178,10 @@ class StationRunner:
             end=_table(after.edge),
             fixation_m=(fixation.x, fixation.y, fixation.z),
             target_m=(final.target_point.x, final.target_point.y, final.target_point.z),
-            series=_series(began_s, states, edges, truths, boxes),
+            series=_series(began_s, states, edges, truths, boxes if station.has_boxes else ()),
             start_box=before.box and BoxFigures.from_message(before.box),
             end_box=after.box and BoxFigures.from_message(after.box),
+            photo=self._stage.photo_figures(station, final),
         )
 
 
@@ -182,6 +191,17 @@ def _click(truth: Any) -> LookAt.Goal:
     goal.header.stamp = truth.header.stamp
     goal.left_x_px, goal.left_y_px = float(round(truth.left_x_px)), float(round(truth.left_y_px))
     return goal
+
+
+def _answer(result: int) -> str:
+    """Return the name of a result of LookAt."""
+    names = (name for name in dir(LookAt.Result) if name.isupper() and getattr(LookAt.Result, name) == result)
+    return next(names, str(result))
+
+
+def _largest_known(values: Iterable[float]) -> float:
+    """Return the largest value that is not NaN; NaN if there is none."""
+    return max((value for value in values if math.isfinite(value)), default=math.nan)
 
 
 def _boxed(view: Image, box: Any) -> Image:
