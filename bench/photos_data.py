@@ -23,7 +23,7 @@ LIT_DIFFERENTLY = "PianoL"
 MOTORCYCLE = "stereo_motorcycle"
 _ETH3D_FOCAL_PX = 542.0
 _NEARER_PX = 1.5  # a disparity larger by this is another surface's
-_FITTED_SHARE = 0.5  # of the motorcycle's columns, the left ones: tools/fit_disparity_model.py may learn from those
+_FITTED_SHARE = 0.5  # of the motorcycle's columns, the left ones: bench/photos_disparity_fit.py may learn from those
 
 
 class NoPhotographsError(ValueError):
@@ -100,9 +100,7 @@ def grey_pair(name: str) -> tuple[Image, Image]:
     return np.asarray(greys[0], np.uint8), np.asarray(greys[1], np.uint8)
 
 
-def motorcycle_points(
-    count: int, seed: int, least_texture: float = 0.0, to_fit_on: bool = False
-) -> list[KnownPoint]:
+def motorcycle_points(count: int, seed: int, least_texture: float = 0.0, to_fit_on: bool = False) -> list[KnownPoint]:
     """Return points drawn evenly from where scikit-image's pair has its disparity, and both images show the place.
 
     The disparity was measured by structured light. The points lie in the right half of the left image, those to fit

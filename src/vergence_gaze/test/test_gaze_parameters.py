@@ -27,7 +27,7 @@ def test_shipped_yaml_equals_the_defaults() -> None:
     ("values", "named"),
     [
         ({"verged.contrast_leave": 0.1}, "'verged.contrast_leave'.*verged.contrast_enter"),
-        ({"verged.leave_rad": 0.001}, "'verged.leave_rad'.*verged.enter_rad"),
+        ({"verged.leave_rad": 0.001}, "'verged.leave_rad'.*verged.direction_rad"),
         ({"law": "magic"}, "predictive"),
         ({"pid_pursuit.kp": (1.0, 2.0)}, "'pid_pursuit.kp'.*three"),
         ({"verged_enter_rad": 0.01}, "verged_enter_rad"),

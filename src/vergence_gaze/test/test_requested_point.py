@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vergence_gaze.control.controller import GazeController
+from vergence_gaze.estimation.observations import Observation
 from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, Result
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.testing.fake_head import TICK_S, FakeHead, VisionModel
@@ -18,7 +19,9 @@ POINT = (0.4, 0.0, 0.0)
 def looked_at(target, vision: VisionModel, until_s: float = 3.0, point=POINT) -> tuple[FakeHead, list[Outcome]]:
     head = FakeHead(RIG, lambda time_s: np.array(target), vision, 3)
     controller = GazeController(RIG, gaze_parameters(), 6 * TICK_S)
-    outcomes, arrived, asked = [], [], False
+    outcomes: list[Outcome] = []
+    arrived: list[Observation] = []
+    asked = False
     while head.time_s < until_s:
         arrived += head.advance()
         if round(head.time_s / TICK_S) % 6:

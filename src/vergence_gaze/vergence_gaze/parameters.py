@@ -261,7 +261,7 @@ class VergedParameters(Parameters):
         formerly="contrast",
     )
     contrast_enter: float = parameter(
-        0.72,
+        0.78,
         "edge contrast up to which `verged` may be set",
         minimum=0,
         maximum=2,
@@ -275,12 +275,20 @@ class VergedParameters(Parameters):
         formerly="contrast_leave",
     )
     enter_rad: float = parameter(
-        0.0085,
-        "vergence error up to which `verged` may be set; for gaze directions the servos' dead band if that is larger",
+        0.0045,
+        "vergence error up to which `verged` may be set on a target at rest",
         unit="rad",
         minimum=1e-4,
         maximum=0.2,
         formerly="verged_enter_rad",
+    )
+    direction_rad: float = parameter(
+        0.0085,
+        "error up to which `verged` may be set: of a gaze direction (the servos' dead band if that is larger), and of "
+        "the vergence on a moving target",
+        unit="rad",
+        minimum=1e-4,
+        maximum=0.2,
     )
     leave_rad: float = parameter(
         0.0155,
@@ -313,6 +321,10 @@ class VergedParameters(Parameters):
         if self.contrast_leave < self.contrast_enter:
             raise ParameterError(
                 "contrast_leave", self.contrast_leave, f"at least verged.contrast_enter, {self.contrast_enter:g}"
+            )
+        if self.leave_rad < self.direction_rad:
+            raise ParameterError(
+                "leave_rad", self.leave_rad, f"at least verged.direction_rad, {self.direction_rad:g} [rad]"
             )
         if self.leave_rad < self.enter_rad:
             raise ParameterError("leave_rad", self.leave_rad, f"at least verged.enter_rad, {self.enter_rad:g} [rad]")

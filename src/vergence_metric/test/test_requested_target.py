@@ -229,3 +229,59 @@ def test_aligned_is_the_inverse_of_unaligned(vertical_px, roll_rad, x, y):
     alignment = Alignment("calibrated", vertical_px, roll_rad)
     there = alignment.unaligned(*alignment.aligned(x, y, 640, 480), 640, 480)
     np.testing.assert_allclose(there, (x, y), atol=1e-9)
+
+
+def striped(seed):
+    """A wall of level stripes, with an upright edge far to the left: along the stripes every place looks alike."""
+    rows = cv2.GaussianBlur(
+        np.random.default_rng(seed).standard_normal((1300, 1)).astype(np.float32), (1, 0), 0, None, 4
+    )
+    wall = np.repeat(128 + 60 * (rows - rows.mean()) / rows.std(), 2000, axis=1)
+    wall[:, :850] = texture(seed, (1300, 850))
+    return np.clip(wall, 0, 255).astype(np.float32)
+
+
+def test_along_an_edge_the_wide_view_says_where_the_point_is():
+    rng, image = np.random.default_rng(3), striped(4)
+    place = np.array([930.0, 650.0])  # 80 px right of the textured part
+
+    def seen(corner):
+        x, y = np.round(corner).astype(int)
+        noisy = image[y : y + 480, x : x + 640] + rng.normal(0.0, 2.0, (480, 640))
+        return np.clip(noisy, 0, 255).astype(np.uint8)
+
+    before, view_before = seen(place - (320, 240)), EyeView(CAMERA, 0.0, 0.0)
+    patch = RememberedPatch(before, view_before, (320.0, 240.0))
+    for moved in ((9, 0), (-12, 4), (14, -6)):
+        found = patch.find(seen(place - (320, 240) - moved), view_before, patch.direction, 24)
+        assert found is not None
+        assert found.pixel == pytest.approx((320.0 + moved[0], 240.0 + moved[1]), abs=2.5)
+
+
+def test_joints_that_report_no_move_leave_the_point_where_it_was():
+    """Servos rest: what looks alike beside the point is not it, however long it is followed."""
+    stage = Stage()
+    stage.show(AHEAD)
+    stage.ask(ASIDE_M, AHEAD)
+    tracks = [stage.show(AHEAD) for _ in range(40)]
+    places = np.array([track.left_px for track in tracks])
+    assert np.abs(places - project(ASIDE_M, True, AHEAD)).max() < 1.0
+
+
+def test_a_repeated_texture_is_ambiguous_and_names_its_distances():
+    """A wall of equal tiles fits at several distances: the track says so and lists them."""
+    tile = texture(7, (130, 40), sigmas=(1.5, 4.0))
+    row = np.tile(tile, (10, 40))
+
+    def seen(shift_px):
+        noise = np.random.default_rng(shift_px).normal(0.0, 2.0, (480, 640))
+        return np.clip(row[200:680, 300 + shift_px : 940 + shift_px] + noise, 0, 255).astype(np.uint8)
+
+    left, right = seen(0), seen(23)
+    stage = Stage()
+    pair = StoredPair(0.1, left, right, views(AHEAD))
+    stage.tracker.request(TrackRequest(5, 0.1, True, (320.0, 240.0)), pair)
+    tracks = [stage.tracker.update(left, right, 0.1 + FRAME_S * n, AHEAD) for n in range(1, 20)]
+    assert {track.status for track in tracks[3:]} == {TrackStatus.AMBIGUOUS}, tracks[-1]
+    found = [disparity_px for disparity_px, _ in tracks[-1].candidates]
+    assert sum(min(abs(d - 23 - 40 * k) for k in range(-4, 4)) < 2.0 for d in found) >= 2

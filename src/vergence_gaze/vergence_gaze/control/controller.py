@@ -15,8 +15,8 @@ from vergence_gaze.estimation.observations import JointResolution, Observation, 
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
-from vergence_gaze.goals.requested_point import RequestedPoint
 from vergence_gaze.goals.goal_resolution import RequestedClass, RequestedPose, resolve_goal
+from vergence_gaze.goals.requested_point import RequestedPoint
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.limits import CommandLimits
 from vergence_gaze.joints.resolution import pulse_steps_rad, rig_with_steps

@@ -192,6 +192,7 @@ class Perception:
 
     def _judge_pair(self, stamp_s: float, now_s: float, verging: bool) -> None:
         visual, by_point = self.tracking.visual, self.tracking.source == "point"
+        self.judge.target_moves = self.tracking.filter.moving
         if by_point:
             stamp_s = self.judge.exposure_for(stamp_s, now_s)
         estimate = self.tracking.estimate(stamp_s)

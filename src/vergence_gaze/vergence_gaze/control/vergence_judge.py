@@ -42,6 +42,8 @@ class VergenceJudge:
         self._target_s, self._on_target_since_s = -math.inf, math.inf
         self.unresolved_rad = 0.0
         """Error that the servos cannot correct, beyond what the limits were made for; it is added to `enter_rad`."""
+        self.target_moves = False
+        """Whether the eyes follow a moving target: then what is seen of it lags behind."""
         self.dead_band_rad = 0.0
         """The servos' largest dead band: no command decides where in it an axis stops."""
         self.contrast = math.nan
@@ -61,12 +63,13 @@ class VergenceJudge:
     @property
     def enter_rad(self) -> float:
         """The largest vergence error at which eyes become verged."""
-        return min(self._p.enter_rad + self.unresolved_rad, self._p.leave_rad)
+        limit_rad = self._p.direction_rad if self.target_moves else self._p.enter_rad
+        return min(limit_rad + self.unresolved_rad, self._p.leave_rad)
 
     @property
     def direction_enter_rad(self) -> float:
         """The largest error of a gaze direction at which eyes become verged."""
-        return max(self.enter_rad, min(self.dead_band_rad, self._p.leave_rad))
+        return min(max(self._p.direction_rad, self.dead_band_rad) + self.unresolved_rad, self._p.leave_rad)
 
     def update_contrast(self, stamp_s: float, contrast: float, now_s: float) -> None:
         """Add the edge contrast of a pair."""

@@ -218,7 +218,12 @@ class TargetTracking(TargetEstimator):
     def update_box(self, sighting: BoxSighting, now_s: float) -> bool:
         """Update by a detection; returns True if it was the target, by its class or its place, and was accepted."""
         by_class = self.class_name is not None
-        if self._tracker_answers or self.point is not None or not sighting.usable or self.class_name not in (None, "", sighting.class_name):
+        if (
+            self._tracker_answers
+            or self.point is not None
+            or not sighting.usable
+            or self.class_name not in (None, "", sighting.class_name)
+        ):
             return False
         if not (by_class or (sighting.whole and self.filter.initialised)):
             return False

@@ -18,8 +18,9 @@ _AMBIGUOUS_S = 3.0
 class Progress:
     """The state that decides a goal, in one cycle. `pose_reached` is None unless the goal is a pose.
 
-    `at_point` says why an empty point counts as looked at, "" while it does not; `ambiguity` which
-    distances fit, "" while only one does. `verged_reason` says why the eyes are verged or not yet, `tracking_note` why the last measurement was rejected.
+    `at_point` says why an empty point counts as looked at and `ambiguity` which distances fit, each "" while that does
+    not hold; `verged_reason` says why the eyes are verged or not yet, `tracking_note` why the last measurement was
+    rejected.
     """
 
     now_s: float

@@ -18,6 +18,7 @@ _AS_GOOD = 1.4  # a rival that leaves up to this factor more unexplained is as g
 _AS_ITSELF = 1.15  # the same, of what the texture leaves unexplained of itself there
 _REPEATS = 0.93  # self-correlation of a repeated texture without noise
 _CLEAR = 3.0  # signal over noise from which a window can tell a repetition
+_WIDER = (2.0, 4.0)  # times the largest window
 _MOST_DEVIATIONS = 12.0
 _UNEXPLAINED = 0.1  # share of the variance that half resolution may leave unexplained of an exact repetition
 _VERTICAL_COST = 0.05  # per pixel, in logarithms of what is unexplained: rows are roughly aligned
@@ -97,8 +98,8 @@ def repetitions(pair: FoveaPair, d: float, layers: Sequence[Profile], parameters
     """Return the disparities that the texture's own repetition makes as good as `d`: no window can tell them apart.
 
     A rival counts only where the left image resembles itself at that distance: what lies beside a depth edge fits well
-    elsewhere too, but repeats nothing. As short edges resemble themselves as well, a window twice as large as the
-    largest has the last word.
+    elsewhere too, but repeats nothing. As edges resemble themselves along their way, windows larger than the largest
+    have the last word: where a repetition ends, they tell.
     """
     textured = [layer for layer in layers if layer.textured]
     if not textured:
@@ -110,11 +111,12 @@ def repetitions(pair: FoveaPair, d: float, layers: Sequence[Profile], parameters
         rivals = [r for r in rivals if _unexplained(layer.at(r)) <= least]
     for layer in textured:
         rivals = _repeated(pair, d, rivals, layer)
-    if not rivals:
-        return []
-    window_px = 2.0 * parameters.windows_px[-1]
-    wide = replace(pair, margin_px=radius_of(window_px) + 4)
-    return _repeated(wide, d, rivals, _profile(wide, window_px, parameters))
+    for window_px in (factor * parameters.windows_px[-1] for factor in _WIDER):
+        if not rivals:
+            break
+        wide = replace(pair, margin_px=radius_of(window_px) + 4)
+        rivals = _repeated(wide, d, rivals, _profile(wide, window_px, parameters))
+    return rivals
 
 
 def _repeated(pair: FoveaPair, d: float, rivals: list[float], layer: Profile) -> list[float]:

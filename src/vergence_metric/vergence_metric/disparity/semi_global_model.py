@@ -1,6 +1,6 @@
 """How likely a candidate of `semi_global` is, and how sure and how precise the answer: three small fitted models.
 
-`tools/fit_disparity_model.py` fits the constants to pairs with ground truth and prints them.
+`bench/photos_disparity_fit.py` fits the constants to pairs with ground truth and prints them.
 """
 
 import math

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 _FORGOTTEN = 0.02  # weight below which a hypothesis is dropped
 _MOST = 8
+_LEAD = 2.0  # times the second weight
 
 
 @dataclass
@@ -42,8 +43,9 @@ class DepthHypotheses:
 
     @property
     def certain(self) -> bool:
-        """True if enough of the recent pairs speak for the likeliest."""
-        return bool(self.ranked) and self.ranked[0].weight >= self._share
+        """True if enough of the recent pairs speak for the likeliest, and clearly more than for any other."""
+        weights = [one.weight for one in self.ranked[:2]] + [0.0, 0.0]
+        return weights[0] >= max(self._share, _LEAD * weights[1])
 
     def update(self, candidates: Sequence[tuple[float, float]]) -> Hypothesis | None:
         """Add the candidates of a pair, as (parallax [rad], probability), the answer first; returns its hypothesis."""

@@ -102,7 +102,7 @@ class RememberedPatch:
         then = [self._view.pixel(view.direction((at[0] + scale * x, at[1] + scale * y))) for x, y in corners]
         place = np.array(self._view.pixel(self.direction))
         source = (np.array(then) - middle + place - 0.5 * (scale - 1)) / scale
-        warp = cv2.getPerspectiveTransform(corners + np.float32([left, top]), source.astype(np.float32))
+        warp = cv2.getPerspectiveTransform(corners + np.array([left, top], np.float32), source.astype(np.float32))
         template = cv2.warpPerspective(
             self._levels[scale],
             warp,

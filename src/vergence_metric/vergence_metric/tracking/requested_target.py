@@ -46,10 +46,12 @@ def weigh_depths(
     if disparity.status not in (DisparityStatus.OK, DisparityStatus.AMBIGUOUS):
         depths.update([])
         return False
-    sure = disparity.confidence
     others = [c for c in disparity.candidates if abs(c.disparity_px - disparity.horizontal_px) > _SAME_PX]
-    likelihood = sum(c.likelihood for c in others)
-    left_over = (1.0 - sure) / max(likelihood, 1.0 - sure, 1e-6)
+    sure, rest = disparity.confidence, sum(c.likelihood for c in others)
+    if disparity.status is DisparityStatus.AMBIGUOUS and rest > 0.0:
+        # Repetitions are as likely as what they repeat.
+        sure = min(sure, max(c.likelihood for c in disparity.candidates))
+    left_over = (1.0 - sure) / max(rest, 1.0 - sure, 1e-6)
     seen = [(disparity.horizontal_px, sure), *((c.disparity_px, left_over * c.likelihood) for c in others)]
     y = left_px[1] - disparity.vertical_px
     answered = depths.update([(parallax(left_px, views, (left_px[0] - d, y)), share) for d, share in seen])

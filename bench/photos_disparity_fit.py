@@ -1,6 +1,6 @@
 """Fit the constants of `vergence_metric.disparity.semi_global_model` to pairs with ground truth, and print them.
 
-    python tools/fit_disparity_model.py FOLDER --leave-out Motorcycle --dense LEFT RIGHT TRUTH 2
+    python -m bench.photos_disparity_fit FOLDER --leave-out Motorcycle --dense LEFT RIGHT TRUTH 2
 
 Of the folder with `targets.json` every other pair is used, so that the others can judge the result; targets count for
 the choice and the confidence only, as their truth is no better than the sub-pixel answer. `--dense` (repeatable) names
@@ -12,7 +12,6 @@ Pairs without an answer, drawn by the benchmark's generator, teach what to refus
 
 import argparse
 import json
-import sys
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
@@ -21,8 +20,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from bench.disparity_pairs import clean, deceptive, hard
 from bench.photos_data import MOTORCYCLE, grey_pair, motorcycle_points
@@ -224,7 +221,7 @@ def _damped(model: Matrix) -> float:
 def _grey(path: Path) -> Image:
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
-        raise SystemExit(f"fit_disparity_model: {path} is no image that can be read")
+        raise SystemExit(f"photos_disparity_fit: {path} is no image that can be read")
     return np.asarray(image, np.uint8)
 
 
