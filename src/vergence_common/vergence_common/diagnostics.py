@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from vergence_rig.report import ERROR, OK, STALE, WARN, Report
@@ -21,7 +22,8 @@ class Diagnostics:
         self._sources: dict[str, Callable[[], Report]] = {}
         self._message, self._statuses = DiagnosticArray(), dict[str, DiagnosticStatus]()
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._timer = node.create_timer(PERIOD_S, self.publish)
+        # Simulated time may stand, and then the reports say why.
+        self._timer = node.create_timer(PERIOD_S, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def add(self, name: str, report: Callable[[], Report]) -> None:
         """Call `report` at every publication. A second source of the same name replaces the first."""

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -116,9 +117,11 @@ class ServoNode(Node):
         self.create_service(
             Trigger, "~/release", lambda request, response: self._on_trigger(self._head.release, response)
         )
-        self.create_timer(1.0 / values.update_rate_hz, lambda: self._head.step(time.monotonic()))
-        self.create_timer(1.0 / values.state_rate_hz, self._publish_state)
-        self.create_timer(1.0, self._check_commanders)
+        # Servos are real also beside simulated time: their time-outs must not stand with /clock.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0 / values.update_rate_hz, lambda: self._head.step(time.monotonic()), clock=steady)
+        self.create_timer(1.0 / values.state_rate_hz, self._publish_state, clock=steady)
+        self.create_timer(1.0, self._check_commanders, clock=steady)
 
     @staticmethod
     def _report_channel(channel: ServoChannel) -> Report:
