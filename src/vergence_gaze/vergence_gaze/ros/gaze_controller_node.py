@@ -137,7 +137,7 @@ class GazeControllerNode(Node):
             self._command.publish(convert.joint_command(command.joints_rad, now_s))
         if command.track_request is not None:
             self._track_requests.publish(convert.track_request(command.track_request, self._left, self._right))
-        self._state.publish(convert.gaze_state(report))
+        self._state.publish(convert.gaze_state(report, now_s))
         if math.isfinite(report.fixation_m[0]):
             self._fixation.publish(convert.point_stamped(report.fixation_m, report.stamp_s))
         if self._cycles % _FEEDBACK_EVERY == 0:

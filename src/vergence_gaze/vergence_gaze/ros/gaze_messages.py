@@ -201,11 +201,12 @@ def joint_command(joints_rad: Array, stamp_s: float) -> JointState:
     return JointState(header=header, name=list(JOINT_NAMES), position=array("d", joints_rad.tolist()))
 
 
-def gaze_state(report: GazeReport) -> GazeState:
-    """Return the state message."""
+def gaze_state(report: GazeReport, now_s: float) -> GazeState:
+    """Return the state message of a control cycle at `now_s`."""
     version, vergence, tilt = report.residual_rad
     return GazeState(
         header=Header(stamp=to_stamp(report.stamp_s), frame_id=BASE_FRAME),
+        cycle_stamp=to_stamp(now_s),
         phase=int(report.phase),
         phase_name=report.phase.name.lower(),
         reason=report.reason,
