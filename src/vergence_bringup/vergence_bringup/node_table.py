@@ -31,7 +31,7 @@ NODES: dict[str, NodeEntry] = {
     "gaze_controller_node": NodeEntry("vergence_gaze", "vergence_gaze.parameter_groups:GROUPS"),
     "photo_node": NodeEntry("vergence_sim", "vergence_sim.photo.parameters:GROUPS", heads=(PHOTOGRAPHED,)),
     "servo_node": NodeEntry("vergence_servo", "vergence_servo.parameters:GROUPS", heads=(REAL,)),
-    "sim_node": NodeEntry("vergence_sim", "vergence_sim.parameters:GROUPS", heads=(SIMULATED,)),
+    "sim_node": NodeEntry("vergence_sim", "vergence_sim.parameters:NODE_GROUPS", heads=(SIMULATED,)),
 }
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError, parameter
 from vergence_sim.camera_parameters import CameraParameters, LeftCameraParameters, RightCameraParameters
+from vergence_sim.clock_parameters import ClockParameters
 
 TARGETS = ("cube", "marker", "straw", "cable", "stick")
 DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
@@ -214,6 +215,9 @@ GROUPS: Groups = (
     ("target.", TargetParameters),
     ("motion.", MotionParameters),
 )
+
+NODE_GROUPS: Groups = (*GROUPS, ("clock.", ClockParameters))
+"""Every parameter group of sim_node."""
 
 _IDEAL: Mapping[str, Any] = {
     "servo": "ideal",

@@ -6,6 +6,7 @@ from vergence_rig.parameters import REQUIRED, Groups, ParameterError, Parameters
 from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_rig.servo import PRESETS
 from vergence_sim.camera_parameters import CameraParameters, LeftCameraParameters, RightCameraParameters
+from vergence_sim.clock_parameters import ClockParameters
 from vergence_sim.parameters import SimParameters, SimulationParameters
 from vergence_sim.photo.joints import Plant
 from vergence_sim.photo.pair import PhotoPoint
@@ -160,6 +161,7 @@ GROUPS: Groups = (
     ("camera.", CameraParameters),
     ("left_camera.", LeftCameraParameters),
     ("right_camera.", RightCameraParameters),
+    ("clock.", ClockParameters),
 )
 
 

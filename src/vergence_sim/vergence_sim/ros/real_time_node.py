@@ -1,4 +1,4 @@
-"""What sim_node and photo_node share: a lockstep world run in real time, with the topics of cameras and servos."""
+"""What sim_node and photo_node share: a lockstep world in real or simulated time, and the topics of the hardware."""
 
 import functools
 import threading
@@ -15,13 +15,17 @@ from vergence_common.diagnostics import OK, WARN, Diagnostics, Report
 from vergence_common.images import array_to_compressed, array_to_image
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
-from vergence_common.stamps import to_stamp
+from vergence_common.stamps import to_nanoseconds, to_stamp
 from vergence_rig.parameters import Groups
 from vergence_rig.rig import JOINT_NAMES
+from vergence_sim.clock_parameters import ClockParameters
 from vergence_sim.parameters import SimParameters
 from vergence_sim.real_time import Event, Schedule
+from vergence_sim.ros.clock_server import START_NS, ClockServer
 from vergence_sim.ros.sim_messages import camera_info, joint_state
 from vergence_sim.world import EYES, Picture, World
+
+_ROUNDING_S = 1e-6
 
 
 class RealTimeNode(Node):
@@ -29,6 +33,8 @@ class RealTimeNode(Node):
 
     A second thread turns exposures into images (blur, lens, noise, JPEG) while the first goes on. Subclasses say what
     the world is, what of it is true, and which further commands it takes; their `_prepare` runs before the thread does.
+
+    With use_sim_time the node owns /clock, and simulated time waits for the nodes that follow it.
     """
 
     def __init__(self, name: str, groups: Groups, **options: Any) -> None:
@@ -57,6 +63,13 @@ class RealTimeNode(Node):
         # One thread: a sensor's noise is drawn in the order of its exposures.
         self._image_pool = ThreadPoolExecutor(1, "images")
         self._prepare(self._settings)
+        self._clock_server: ClockServer | None = None
+        if self.get_parameter("use_sim_time").value:
+            period_s = 1.0 / self._sim_parameters(self._settings).camera.frame_rate_hz
+            self._clock_server = ClockServer(
+                self, lambda: self._settings.get(ClockParameters), 0.5 * period_s, qos, self._diagnostics
+            )
+        self._start_s = START_NS * 1e-9
         self._thread = threading.Thread(target=self._run, name="simulation", daemon=True)
         self._thread.start()
         # A world that cannot start ends the node with its reason.
@@ -67,6 +80,8 @@ class RealTimeNode(Node):
     def close(self) -> None:
         """End the simulation."""
         self._stop.set()
+        if self._clock_server is not None:
+            self._clock_server.wake()
         self._thread.join(timeout=5.0)
         self._image_pool.shutdown()
 
@@ -88,13 +103,20 @@ class RealTimeNode(Node):
 
     def _do(self, action: Callable[[Any], None]) -> None:
         """Have the world's thread do something with the world; a ValueError refuses it."""
-        self._actions.append((self._now_s(), lambda world, _: action(world)))
+        self._add_action(lambda world, _: action(world))
 
     def _refuse(self, reason: str) -> None:
         self._refused.append(reason)
         self.get_logger().warning(f"command refused, nothing moves: {reason}", throttle_duration_sec=1.0)
 
+    def _add_action(self, action: Callable[[Any, float], None]) -> None:
+        self._actions.append((self._now_s(), action))
+        if self._clock_server is not None:
+            self._clock_server.wake()
+
     def _now_s(self) -> float:
+        if self._clock_server is not None:
+            return self._clock_server.now_s
         return float(self.get_clock().now().nanoseconds) * 1e-9
 
     def _on_command(self, message: JointState) -> None:
@@ -105,7 +127,8 @@ class RealTimeNode(Node):
             )
             return
         angles = dict(zip(message.name, message.position, strict=True))
-        self._actions.append((self._now_s(), functools.partial(_command, angles)))
+        latency_s = self._settings.get(ClockParameters).command_latency_s if self._clock_server is not None else 0.0
+        self._add_action(functools.partial(_command, angles, latency_s))
 
     def _on_settings(self, settings: ParameterSet) -> None:
         parameters = self._sim_parameters(settings)
@@ -119,18 +142,12 @@ class RealTimeNode(Node):
             self._started.set()
             return
         self._started.set()
-        start_s = self._now_s()
         schedule = Schedule(world.parameters, 0.0)
         try:
-            while not self._stop.is_set():
-                now_s = self._now_s() - start_s
-                wait_s = schedule.next_due_s() - now_s
-                if wait_s > 0:
-                    self._stop.wait(min(wait_s, 0.1))
-                    continue
-                self._drain_actions(world, schedule, start_s)
-                self._handle(schedule.pop(now_s), world, schedule, start_s)
-                self._dropped = schedule.dropped
+            if self._clock_server is None:
+                self._run_in_real_time(world, schedule)
+            else:
+                self._run_in_simulated_time(world, schedule, self._clock_server)
         except Exception as error:
             if self.context.ok():
                 self._failure = error
@@ -138,21 +155,52 @@ class RealTimeNode(Node):
         finally:
             world.close()
 
-    def _drain_actions(self, world: World, schedule: Schedule, start_s: float) -> None:
+    def _run_in_real_time(self, world: World, schedule: Schedule) -> None:
+        self._start_s = self._now_s()
+        while not self._stop.is_set():
+            now_s = self._now_s() - self._start_s
+            wait_s = schedule.next_due_s() - now_s
+            if wait_s > 0:
+                self._stop.wait(min(wait_s, 0.1))
+                continue
+            self._drain_actions(world, schedule)
+            self._handle(schedule.pop(now_s), world, schedule)
+            self._dropped = schedule.dropped
+
+    def _run_in_simulated_time(self, world: World, schedule: Schedule, clock: ClockServer) -> None:
+        while self._wait(clock.may_advance, clock, world, schedule):
+            next_s = clock.next_s - self._start_s + _ROUNDING_S
+            while schedule.next_due_s() <= next_s:
+                self._handle(schedule.pop(schedule.next_due_s()), world, schedule)
+            # What is measured in the images so far arrives before the tick.
+            if self._wait(clock.is_followed, clock, world, schedule):
+                clock.advance()
+
+    def _wait(self, condition: Callable[[], bool], clock: ClockServer, world: World, schedule: Schedule) -> bool:
+        """Wait for a condition and do what is commanded meanwhile; return False if the node ends instead."""
+        while not self._stop.is_set():
+            clock.update()
+            self._drain_actions(world, schedule)
+            if condition():
+                return True
+            clock.wait()
+        return False
+
+    def _drain_actions(self, world: World, schedule: Schedule) -> None:
         while self._actions:
             arrived_s, action = self._actions.popleft()
             try:
-                action(world, arrived_s - start_s)
+                action(world, arrived_s - self._start_s)
             except ValueError as error:
                 self._refuse(str(error))
             schedule.set_jitter(world.parameters.camera.frame_jitter_s)
 
-    def _handle(self, event: Event, world: World, schedule: Schedule, start_s: float) -> None:
+    def _handle(self, event: Event, world: World, schedule: Schedule) -> None:
         if event.kind == "publish":
             self._publish_image(event.eye, *event.payload)  # type: ignore[misc]
             return
         world.advance_to(event.due_s)
-        stamp = to_stamp(start_s + world.time_s)
+        stamp = to_stamp(self._start_s + world.time_s)
         if event.kind == "joints":
             self._joints.publish(joint_state(stamp, world.joint_states()))
             if self._true_joints.get_subscription_count():
@@ -161,7 +209,10 @@ class RealTimeNode(Node):
         header = Header(stamp=stamp, frame_id=f"{event.eye}_camera_optical_frame")
         picture = self._image_pool.submit(world.expose(event.eye))
         info = camera_info(header, world.lenses[event.eye])
-        schedule.publish(event.eye, event.due_s + world.parameters.camera.latency_s, (header, picture, info))
+        latency_s = world.parameters.camera.latency_s
+        if self._clock_server is not None:
+            latency_s += self._settings.get(ClockParameters).image_latency_s
+        schedule.publish(event.eye, event.due_s + latency_s, (header, picture, info))
         if event.eye == "left":
             self._publish_truth(stamp, world)
 
@@ -172,6 +223,8 @@ class RealTimeNode(Node):
             self._jpegs[eye].publish(array_to_compressed(picture.result(), header))
         self._infos[eye].publish(info)
         self._published[eye] += 1
+        if self._clock_server is not None:
+            self._clock_server.add_image(eye, to_nanoseconds(header.stamp))
 
     def _report_cameras(self) -> Report:
         values: dict[str, object] = {f"{eye}_published": count for eye, count in self._published.items()}
@@ -191,5 +244,5 @@ class RealTimeNode(Node):
         return Report(OK, "no command refused")
 
 
-def _command(angles_rad: Mapping[str, float], world: World, arrived_s: float) -> None:
-    world.command(angles_rad, arrived_s)
+def _command(angles_rad: Mapping[str, float], latency_s: float, world: World, sent_s: float) -> None:
+    world.command(angles_rad, sent_s + latency_s)

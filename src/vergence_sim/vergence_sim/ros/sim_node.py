@@ -10,7 +10,7 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet
 from vergence_msgs.msg import TrueBoxes, TrueVergence
 from vergence_rig.rig import load_rig
-from vergence_sim.parameters import GROUPS, SimParameters
+from vergence_sim.parameters import GROUPS, NODE_GROUPS, SimParameters
 from vergence_sim.ros.real_time_node import RealTimeNode
 from vergence_sim.ros.sim_messages import true_boxes, true_vergence
 from vergence_sim.simulator import Simulator
@@ -21,7 +21,7 @@ class SimNode(RealTimeNode):
     """MuJoCo's world in real time; the simulation's thread owns it and its OpenGL context."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("sim_node", GROUPS, **options)
+        super().__init__("sim_node", NODE_GROUPS, **options)
         self.get_logger().info("the simulated head and room are ready")
 
     def _prepare(self, settings: ParameterSet) -> None:
