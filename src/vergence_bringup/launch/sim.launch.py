@@ -1,6 +1,7 @@
 """The whole graph on the simulated head: sim_node, the metric nodes, gaze_controller_node.
 
 ros2 launch vergence_bringup sim.launch.py [preset:=ideal] [detector:=false] [encoder:=false] [namespace:=head]
+    [use_sim_time:=true]
 """
 
 from pathlib import Path
@@ -17,14 +18,14 @@ from vergence_bringup.node_table import NODES
 
 def generate_launch_description() -> LaunchDescription:
     config = Path(get_package_share_directory("vergence_bringup")) / "config"
-    rig = LaunchConfiguration("rig")
+    rig, simulated = LaunchConfiguration("rig"), LaunchConfiguration("use_sim_time")
 
     def node(executable: str, condition: str | None = None, **parameters: object) -> Node:
         return Node(
             package=NODES[executable].package,
             executable=executable,
             output="screen",
-            parameters=[str(config / f"{executable}.yaml"), {"rig": rig, **parameters}],
+            parameters=[str(config / f"{executable}.yaml"), {"rig": rig, "use_sim_time": simulated, **parameters}],
             condition=IfCondition(LaunchConfiguration(condition)) if condition else None,
         )
 
@@ -46,6 +47,11 @@ def generate_launch_description() -> LaunchDescription:
                 "encoder",
                 default_value="true",
                 description="run eye_rotation_node, the visual encoder of the eyes' angles",
+            ),
+            DeclareLaunchArgument(
+                "use_sim_time",
+                default_value="false",
+                description="simulated time: sim_node publishes /clock, which waits for the nodes that follow it",
             ),
             DeclareLaunchArgument(
                 "fastdds_profile", default_value=str(config / "fastdds.xml"), description="Fast DDS profile"

@@ -28,6 +28,9 @@ class ScriptedRunner:
         if "ready" in self.failures:
             raise self.failures["ready"]
 
+    def time_figures(self):
+        return {"simulated_s": 60.0, "real_time_factor": 0.6}
+
     def visit(self, station):
         self.visited.append(station.name)
         if station.name in self.failures:
@@ -112,3 +115,5 @@ def test_the_command_writes_summary_and_report_either_way(failures, status, monk
     printed = capsys.readouterr()
     assert printed.err == ""
     assert f"{3 - status} of 3 stations verged" in printed.out
+    assert "60 s of simulated time passed at 0.6 of real time" in printed.out
+    assert stored["real_time_factor"] == 0.6

@@ -46,6 +46,11 @@ def test_the_simulated_head_is_the_whole_graph_of_the_table():
     assert {name for name, _ in nodes("sim.launch.py")} == set(graph(SIMULATED))
 
 
+@pytest.mark.parametrize(("arguments", "simulated"), [({}, False), ({"use_sim_time": "true"}, True)])
+def test_every_node_of_the_simulated_head_has_one_time(arguments, simulated):
+    assert {given["use_sim_time"] for _, given in nodes("sim.launch.py", **arguments)} == {simulated}
+
+
 @pytest.mark.parametrize(
     ("file", "arguments", "runs", "rests"),
     [

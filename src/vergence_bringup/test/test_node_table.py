@@ -7,7 +7,7 @@ import pytest
 
 from vergence_bringup.commands.doctor import examine
 from vergence_bringup.node_table import NODES, PHOTOGRAPHED, REAL, SIMULATED, graph
-from vergence_bringup.ros.simulated_head import FRAME_RATE_HZ, LEFT_OUT, simulated_head
+from vergence_bringup.ros.simulated_head import FRAME_RATE_HZ, LEFT_OUT_IN_REAL_TIME, simulated_head
 
 ROOT = Path(__file__).resolve().parents[3]
 SOURCES = ("src", "bench", "test", "tools", "training")
@@ -47,16 +47,21 @@ def test_every_graph_has_one_source_of_images_and_every_node_behind_it():
     assert set(graph(REAL)) == behind | {"camera_node", "servo_node"}
 
 
-def test_the_simulated_head_is_the_graph_but_what_is_left_out_by_name_on_one_rig(tmp_path):
-    commands = simulated_head(tmp_path / "rig.yaml", seed=3)
-    assert tuple(commands) == tuple(name for name in graph(SIMULATED) if name not in LEFT_OUT)
-    assert set(LEFT_OUT) < set(graph(SIMULATED))
+@pytest.mark.parametrize("simulated_time", [False, True])
+def test_the_simulated_head_is_the_whole_graph_but_what_is_left_out_in_real_time(simulated_time, tmp_path):
+    commands = simulated_head(tmp_path / "rig.yaml", simulated_time=simulated_time, seed=3)
+    left_out = () if simulated_time else LEFT_OUT_IN_REAL_TIME
+    assert tuple(commands) == tuple(name for name in graph(SIMULATED) if name not in left_out)
+    assert set(left_out) < set(graph(SIMULATED))
     for executable, command in commands.items():
         assert (command.package, command.executable) == (NODES[executable].package, executable)
-        assert (command.parameters or {})["rig"] == str(tmp_path / "rig.yaml")
+        parameters = command.parameters or {}
+        assert parameters["rig"] == str(tmp_path / "rig.yaml")
+        assert parameters["use_sim_time"] == simulated_time
     parameters = commands["sim_node"].parameters or {}
     assert (parameters["seed"], parameters["camera.frame_rate_hz"]) == (3, FRAME_RATE_HZ)
-    before = simulated_head(tmp_path / "rig.yaml", PHOTOGRAPHED, left="a.png")
+    assert parameters["clock.stepped"] == simulated_time
+    before = simulated_head(tmp_path / "rig.yaml", PHOTOGRAPHED, simulated_time=simulated_time, left="a.png")
     assert set(before) == set(commands) - {"sim_node"} | {"photo_node"}
     assert (before["photo_node"].parameters or {})["left"] == "a.png"
 

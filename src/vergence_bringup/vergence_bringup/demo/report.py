@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vergence_bringup.demo import photo_report
-from vergence_bringup.demo.result import Series, StationResult, verdict_line
+from vergence_bringup.demo.result import Series, StationResult, duration_text, verdict_line
 from vergence_bringup.figures.boxes import CORNERS, signed
 from vergence_bringup.figures.svg_plot import Line, plot
 
@@ -34,7 +34,7 @@ def write_report(path: Path, results: Sequence[StationResult], settings: dict[st
         f"<style>{_STYLE}</style></head><body><h1>Vergence demo</h1>",
         f"<p>{verdict_line(results)}. "
         f"Servos: {html.escape(str(settings['servo']))}, cameras: {html.escape(str(settings['cameras']))}, "
-        f"{settings['duration_s']:g} s in all.</p>",
+        f"{duration_text(settings)}.</p>",
     ]
     if "photographs" in settings:
         parts += [photo_report.introduction(settings["photographs"]), _photographs(out_dir / "pictures")]

@@ -213,6 +213,15 @@ def verdict_line(results: Sequence[StationResult]) -> str:
     )
 
 
+def duration_text(settings: dict[str, Any]) -> str:
+    """Return how long a demo took, from the settings of its summary."""
+    took = f"{settings['duration_s']:g} s in all"
+    factor = settings.get("real_time_factor")
+    if factor is None:
+        return f"{took}, in real time"
+    return f"{took}; {settings['simulated_s']:g} s of simulated time passed at {factor:g} of real time"
+
+
 def _figure(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "-"
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from vergence_bringup.demo.result import StationResult, unfinished
 from vergence_bringup.demo.stations import Station
@@ -17,6 +17,9 @@ class Runner(Protocol):
 
     def visit(self, station: Station) -> StationResult:
         """Return the result of a station; raises GraphError or ProcessError."""
+
+    def time_figures(self) -> dict[str, Any]:
+        """Return how time passed, for the summary; see `result.duration_text`."""
 
 
 def visit_all(

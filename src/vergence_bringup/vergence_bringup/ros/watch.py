@@ -15,10 +15,13 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, JointState
 
 from vergence_bringup.figures.watch_screen import Screen, Snapshot, Stream
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
+from vergence_common.stamps import to_seconds
 from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, VergenceError
 from vergence_rig.rig import load_rig
 
@@ -64,10 +67,17 @@ class GraphMonitor(Node):
         for topic, (kind, qos) in _TOPICS.items():
             self.create_subscription(kind, topic, self._add_to(self.streams[topic]), qos)
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+        self._simulated_s: float | None = None
+        best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self.create_subscription(Clock, "/clock", self._on_clock, best_effort)
 
     def snapshot(self) -> Snapshot:
-        """Return the state now."""
-        return Snapshot(time.monotonic(), time.time(), self.streams, self.health)
+        """Return the state now; stamps are of simulated time where /clock is published."""
+        now_s = time.time() if self._simulated_s is None else self._simulated_s
+        return Snapshot(time.monotonic(), now_s, self.streams, self.health)
+
+    def _on_clock(self, message: Clock) -> None:
+        self._simulated_s = to_seconds(message.clock)
 
     def _add_to(self, stream: Stream) -> Any:
         return lambda message: stream.add(message, time.monotonic())

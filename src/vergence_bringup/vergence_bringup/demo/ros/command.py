@@ -16,7 +16,7 @@ import yaml
 from vergence_bringup.demo.photo_report import write_overview
 from vergence_bringup.demo.photographs import CLICKS, SHORT_CLICKS, Photographs, open_photographs
 from vergence_bringup.demo.report import write_report
-from vergence_bringup.demo.result import StationResult, all_passed, table, verdict_line, write_summary
+from vergence_bringup.demo.result import StationResult, all_passed, duration_text, table, verdict_line, write_summary
 from vergence_bringup.demo.stations import Station, stations
 from vergence_bringup.demo.visits import Runner, visit_all
 from vergence_bringup.node_table import PHOTOGRAPHED
@@ -41,6 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--ideal", action="store_true", help="ideal servos and cameras instead of realistic ones")
     parser.add_argument("--station", action="append", metavar="NAME", help="only this station (may be repeated)")
+    parser.add_argument(
+        "--real-time",
+        action="store_true",
+        help="run by the wall clock, whether or not this machine keeps up (default: in simulated time, which waits)",
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of the simulator's noise (default: 0)")
 
 
@@ -79,6 +84,7 @@ def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station], photograp
             processes.start(name, command)
         with _runner(options, rig, photographs, processes.check) as runner:
             visit_all(runner, chosen, results, _say)
+            time_figures = runner.time_figures()
         _say("stopping the nodes")
         statuses = processes.stop()
     for name, status in statuses.items():
@@ -89,6 +95,7 @@ def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station], photograp
         "servo": "ideal" if options.ideal else "sg90",
         "cameras": "ideal" if options.ideal else "realistic",
         "duration_s": round(time.monotonic() - started, 1),
+        **time_figures,
     }
     if photographs is not None:
         settings["photographs"] = photographs.as_json()
@@ -98,6 +105,7 @@ def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station], photograp
     print()
     print(table(results))
     print(f"\n{verdict_line(results)}")
+    print(duration_text(settings))
     print(f"report: {options.out / 'report.html'}   figures: {options.out / 'summary.json'}")
     return 0 if all_passed(results) and not any(statuses.values()) else 1
 
@@ -112,7 +120,7 @@ def _runner(
     from vergence_bringup.demo.ros.stage import RoomStage, Stage
     from vergence_bringup.demo.ros.station_runner import StationRunner, tolerance_deg
 
-    recorder = Recorder()
+    recorder = Recorder(stepped=not options.real_time)
     try:
         stage: Stage
         if photographs is None:
@@ -127,9 +135,10 @@ def _runner(
 def _commands(options: argparse.Namespace, photographs: Photographs | None) -> dict[str, NodeCommand]:
     rig = _ideal_rig(options.out) if options.ideal else config_dir() / "rig.yaml"
     world: dict[str, object] = {"seed": options.seed, "preset": "ideal" if options.ideal else "realistic"}
+    simulated_time = not options.real_time
     if photographs is None:
-        return simulated_head(rig, **world)
-    return simulated_head(rig, PHOTOGRAPHED, **world, **photographs.parameters)
+        return simulated_head(rig, simulated_time=simulated_time, **world)
+    return simulated_head(rig, PHOTOGRAPHED, simulated_time=simulated_time, **world, **photographs.parameters)
 
 
 def _ideal_rig(out_dir: Path) -> Path:

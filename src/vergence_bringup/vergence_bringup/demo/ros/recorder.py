@@ -1,7 +1,6 @@
 """Records the running graph for the demo: states, metrics, ground truth, and image pairs with their metrics."""
 
 import threading
-import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -17,6 +16,7 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import Image
 
+from vergence_bringup.demo.ros.timeline import Check, RealTime, SteppedTime, Timeline
 from vergence_bringup.graph_errors import GraphError
 from vergence_common.images import image_to_array
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
@@ -53,12 +53,13 @@ def _pair_key(message: Any) -> tuple[int, float]:
 class Recorder:
     """A node in a thread of its own; the main thread waits for its messages."""
 
-    def __init__(self, domain_id: int | None = None) -> None:
-        """Subscribe in a DDS domain; None for the environment's."""
+    def __init__(self, domain_id: int | None = None, stepped: bool = False) -> None:
+        """Subscribe in a DDS domain, None for the environment's; `stepped` steps the simulator's time."""
         if not rclpy.ok():
             rclpy.init(domain_id=domain_id)
         self.node = Node("vergence_demo")
         self._changed = threading.Condition()
+        self.time: Timeline
         self.states: list[Stamped] = []
         self.edges: list[Stamped] = []
         self.boxes: list[Stamped] = []
@@ -73,6 +74,12 @@ class Recorder:
         self._image_subscriptions: list[Any] = []
         self._further: list[Any] = []
         self._look_at = ActionClient(self.node, LookAt, "gaze/look_at")
+        # Where time is stepped, images of every pair are here, at whatever step their discovery would have ended.
+        self._always_images = stepped
+        if stepped:
+            self._subscribe_to_images()
+        # After the subscriptions: what was sent before the simulator stood is then here.
+        self.time = SteppedTime(self.node, self._changed) if stepped else RealTime(self.node, self._changed)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin, name="demo recorder", daemon=True)
@@ -85,7 +92,7 @@ class Recorder:
         self.node.destroy_node()
         rclpy.try_shutdown()
 
-    def record(self, message_type: type, topic: str, check_alive: Callable[[], None]) -> list[Stamped]:
+    def record(self, message_type: type, topic: str, check_alive: Check) -> list[Stamped]:
         """Record one more topic from now on; return the list to which its messages are appended."""
         series: list[Stamped] = []
         self._in_executor(
@@ -97,51 +104,40 @@ class Recorder:
         return series
 
     def now_s(self) -> float:
-        """Return the node's time in seconds."""
-        return float(self.node.get_clock().now().nanoseconds) * 1e-9
+        """Return the time in seconds."""
+        return self.time.now_s()
 
-    def wait_for(
-        self, what: str, condition: Callable[[], Any], timeout_s: float, check_alive: Callable[[], None]
-    ) -> Any:
-        """Return the first true value of `condition`, which is called after every message.
+    def wait_for(self, what: str, condition: Callable[[], Any], timeout_s: float, check_alive: Check) -> Any:
+        """Return the first true value of `condition`, for which time passes.
 
         `check_alive` is called meanwhile and raises when a process has ended. Raises GraphError after `timeout_s`.
         """
-        deadline = time.monotonic() + timeout_s
-        while True:
-            with self._changed:
-                answer = condition()
-                if answer:
-                    return answer
-                left = deadline - time.monotonic()
-                if left <= 0:
-                    raise GraphError(f"timeout after {timeout_s:g} s waiting for {what}")
-                self._changed.wait(min(left, 0.25))
-            check_alive()
+        return self.time.wait_for(what, condition, timeout_s, check_alive)
 
-    def settle(self, duration_s: float, check_alive: Callable[[], None]) -> None:
+    def settle(self, duration_s: float, check_alive: Check) -> None:
         """Let the graph run for a while."""
-        end = time.monotonic() + duration_s
-        while (left := end - time.monotonic()) > 0:
-            time.sleep(min(left, 0.25))
-            check_alive()
+        self.time.settle(duration_s, check_alive)
 
-    def look_at(self, goal: LookAt.Goal, check_alive: Callable[[], None], timeout_s: float = 30.0) -> LookAt.Result:
+    def look_at(self, goal: LookAt.Goal, check_alive: Check, timeout_s: float = 30.0) -> LookAt.Result:
         """Send a goal and return its result."""
-        self.wait_for("the action gaze/look_at", self._look_at.server_is_ready, 20.0, check_alive)
+        self.time.wait_for_answer("the action gaze/look_at", self._look_at.server_is_ready, 20.0, check_alive)
         # Requests are sent in the executor's thread: rclpy discards a response that arrives before the sending thread
         # has registered the request.
         sent = self._in_executor(lambda: self._look_at.send_goal_async(goal), check_alive)
         handle = self._future("gaze/look_at to accept a goal", sent, 5.0, check_alive)
         if not handle.accepted:
             raise GraphError("gaze/look_at refused the goal")
+        began_s = self.now_s()
         ended = self._in_executor(handle.get_result_async, check_alive)
-        return self._future("gaze/look_at to end", ended, timeout_s, check_alive).result
+        self.wait_for("gaze/look_at to end", ended.done, timeout_s, check_alive)
+        result = ended.result().result
+        self.time.settle_after_goal(began_s + result.time_s, check_alive)
+        return result
 
-    def set_parameters(self, node_name: str, values: dict[str, Any], check_alive: Callable[[], None]) -> None:
+    def set_parameters(self, node_name: str, values: dict[str, Any], check_alive: Check) -> None:
         """Set parameters of a running node, all at once; raises GraphError with the reason if it refuses."""
         client = AsyncParameterClient(self.node, node_name)
-        self.wait_for(f"the parameters of {node_name}", client.services_are_ready, 20.0, check_alive)
+        self.time.wait_for_answer(f"the parameters of {node_name}", client.services_are_ready, 20.0, check_alive)
         request = [Parameter(name, value=value) for name, value in values.items()]
         answer = self._future(
             f"{node_name} to set parameters", client.set_parameters_atomically(request), 5.0, check_alive
@@ -149,7 +145,7 @@ class Recorder:
         if not answer.result.successful:
             raise GraphError(f"{node_name} refused {values}: {answer.result.reason}")
 
-    def picture(self, with_boxes: bool, check_alive: Callable[[], None], timeout_s: float = 20.0) -> StereoPicture:
+    def picture(self, with_boxes: bool, check_alive: Check, timeout_s: float = 20.0) -> StereoPicture:
         """Return the next pair of images with the metrics that the graph computed from the same pair.
 
         Boxes arrive a few times a second, and a busy machine skips pairs: after a while the newest boxes are used. Call
@@ -157,15 +153,16 @@ class Recorder:
         """
         for images in self._images.values():
             images.clear()
-        first_box, same_pair_until_s = len(self.boxes), time.monotonic() + _SAME_PAIR_S
-        self._in_executor(self._subscribe_to_images, check_alive)
+        first_box, same_pair_until_s = len(self.boxes), self.now_s() + _SAME_PAIR_S
+        if not self._always_images:
+            self._in_executor(self._subscribe_to_images, check_alive)
 
         def matched() -> tuple[Image, Image, EdgeVergence, BoxVergence | None] | None:
             arrived = self.boxes[first_box:] if with_boxes else ()
             boxes = {_pair_key(entry.message): entry.message for entry in arrived}
             for left, right, edge in self._edge_pairs():
                 box = boxes.get(_pair_key(edge))
-                if box is None and boxes and time.monotonic() > same_pair_until_s:
+                if box is None and boxes and self.now_s() > same_pair_until_s:
                     box = self.boxes[-1].message
                 if box is not None or not with_boxes:
                     return left, right, edge, box
@@ -175,10 +172,11 @@ class Recorder:
         try:
             left, right, edge, box = self.wait_for(what, matched, timeout_s, check_alive)
         finally:
-            self._in_executor(self._unsubscribe_from_images, check_alive)
+            if not self._always_images:
+                self._in_executor(self._unsubscribe_from_images, check_alive)
         return StereoPicture(image_to_array(left).copy(), image_to_array(right).copy(), edge, box)
 
-    def _in_executor(self, work: Callable[[], Any], check_alive: Callable[[], None]) -> Any:
+    def _in_executor(self, work: Callable[[], Any], check_alive: Check) -> Any:
         # Entities must not be created or destroyed while the executor waits on them.
         return self._future("the recorder's own thread", self._executor.create_task(work), 5.0, check_alive)
 
@@ -225,8 +223,8 @@ class Recorder:
 
         return append
 
-    def _future(self, what: str, future: Any, timeout_s: float, check_alive: Callable[[], None]) -> Any:
-        self.wait_for(what, future.done, timeout_s, check_alive)
+    def _future(self, what: str, future: Any, timeout_s: float, check_alive: Check) -> Any:
+        self.time.wait_for_answer(what, future.done, timeout_s, check_alive)
         return future.result()
 
     def _spin(self) -> None:

@@ -10,6 +10,7 @@ from geometry_msgs.msg import PointStamped
 from vergence_bringup.demo.photographs import PhotoFigures
 from vergence_bringup.demo.ros.recorder import Recorder
 from vergence_bringup.demo.stations import Station
+from vergence_common.stamps import to_stamp
 from vergence_msgs.action import LookAt
 
 _OUT_OF_SIGHT_M = (10.0, 0.0, -10.0)
@@ -30,6 +31,7 @@ class Stage:
     def wait_until_ready(self) -> None:
         """Wait until every node publishes; raises GraphError."""
         recorder = self._recorder
+        recorder.time.begin(self._check_alive)
         recorder.wait_for(f"ground truth from {self.source}", lambda: recorder.truths, 40.0, self._check_alive)
         recorder.wait_for("vergence/edge from edge_metric_node", lambda: recorder.edges, 40.0, self._check_alive)
         recorder.wait_for("gaze/state from gaze_controller_node", lambda: recorder.states, 40.0, self._check_alive)
@@ -75,14 +77,14 @@ class RoomStage(Stage):
         """Wait until every node publishes and sim_node places objects; raises GraphError."""
         super().wait_until_ready()
         for what, publisher in self._places.items():
-            self._recorder.wait_for(
+            self._recorder.time.wait_for_answer(
                 f"sim_node to subscribe to sim/{what}_pose", publisher.get_subscription_count, 20.0, self._check_alive
             )
 
     def put(self, what: str, place_m: Sequence[float] | npt.NDArray[np.float64]) -> None:
         """Place an object's centre in rig_base (3,) [m]."""
         message = PointStamped()
-        message.header.stamp = self._recorder.node.get_clock().now().to_msg()
+        message.header.stamp = to_stamp(self._recorder.now_s())
         message.header.frame_id = "rig_base"
         message.point.x, message.point.y, message.point.z = (float(value) for value in place_m)
         self._places[what].publish(message)

@@ -62,12 +62,17 @@ class StationRunner:
         """Wait until every node publishes."""
         self._stage.wait_until_ready()
 
+    def time_figures(self) -> dict[str, Any]:
+        """Return how time passed, for the summary."""
+        return self._recorder.time.figures()
+
     def visit(self, station: Station) -> StationResult:
         """Show the target, send a goal to look at it, and return the result.
 
         The goal is a click on the left image or the target's class.
         """
         recorder = self._recorder
+        recorder.time.align(self._check_alive)
         self._stage.clear()  # until the eyes are at the start
         recorder.set_parameters("gaze_controller_node", {"mode": "both_eyes"}, self._check_alive)
         self._stage.send_eyes(
@@ -83,6 +88,7 @@ class StationRunner:
         )
         before = recorder.picture(station.has_boxes, self._check_alive)
         self._store(station, "start", before, truth)
+        recorder.time.align(self._check_alive)
 
         began = recorder.now_s()
         marks = len(recorder.states), len(recorder.edges), len(recorder.truths), len(recorder.boxes)
@@ -157,7 +163,7 @@ class StationRunner:
                 if held
                 else "gaze/state was not received"
             )
-        reported_at_s = next((entry.arrival_s for entry in states if entry.message.verged), math.nan)
+        reported_at_s = next((to_seconds(e.message.cycle_stamp) for e in states if e.message.verged), math.nan)
         end_truths = [entry.message for entry in truths if entry.arrival_s >= held_from_s]
         final = truths[-1].message
         fixation = states[-1].message.target
@@ -241,7 +247,7 @@ def _series(
         time_s=stamps(edges),
         metric_px=np.array(metric, np.float64),
         contrast=np.array([entry.message.contrast[column] for entry in edges], np.float64),
-        state_time_s=np.array([entry.arrival_s - began_s for entry in states]),
+        state_time_s=np.array([to_seconds(entry.message.cycle_stamp) - began_s for entry in states]),
         vergence_deg=np.degrees([entry.message.vergence_rad for entry in states]),
         truth_time_s=stamps(truths),
         true_vergence_deg=np.degrees(true_vergence),
