@@ -232,6 +232,13 @@ def test_silence_holds_then_releases_then_a_fresh_command_resumes(make_graph: Ca
     graph.drive(pan_left=0.1)
 
 
+def test_its_time_outs_go_on_where_simulated_time_stands(make_graph: Callable[..., Graph]):
+    graph = make_graph(use_sim_time=True, command_timeout_s=0.1, release_timeout_s=0.5)
+    graph.until(lambda: graph.duty_us(0) > 0, lambda: graph.command(stamp_s=0.0, pan_left=0.2))
+    graph.until(lambda: graph.duty_us(0) == 0)
+    assert graph.states
+
+
 def test_enable_park_and_release(make_graph: Callable[..., Graph]):
     graph = make_graph(enabled=False, park_rad=[0.1, 0.1, 0.1], park_speed_rad_s=20.0)
     assert not graph.call(Trigger, "park", Trigger.Request()).success

@@ -218,7 +218,8 @@ class SimulatedClock:
 
     def rate(self, wall_s: float) -> float:
         """Return simulated over real time in the last seconds; 0 while time stands."""
-        recent = [entry for entry in self._rates if wall_s - entry[0] <= _RATE_WINDOW_S]
+        # A copy: diagnostics ask for it from another thread.
+        recent = [entry for entry in list(self._rates) if wall_s - entry[0] <= _RATE_WINDOW_S]
         if len(recent) < 2 or wall_s <= recent[0][0]:
             return 0.0
         return (recent[-1][1] - recent[0][1]) * 1e-9 / (wall_s - recent[0][0])

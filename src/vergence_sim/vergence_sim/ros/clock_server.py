@@ -143,6 +143,7 @@ class ClockServer:
             topic for topic in FOLLOWERS if self._node.count_publishers(self._node.resolve_topic_name(topic))
         )
         for topic in self._present - present:
+            self._node.get_logger().info(f"{topic}: no longer published: simulated time does not wait for it")
             self._queue(functools.partial(self._clock.forget, topic))
         if present != self._present:
             self._present, self._present_since_s = present, time.monotonic()
