@@ -155,9 +155,7 @@ class TargetTracking(TargetEstimator):
                 distances_m.append(f"{np.linalg.norm(point_m):.2f} m")
             else:
                 distances_m.append("far away")
-        if len(distances_m) < 2:
-            return "the target's distance is not certain"
-        return f"the target may be at one of several distances: {', '.join(distances_m)}"
+        return f"{sighting.reason}: {', '.join(distances_m)}" if len(distances_m) > 1 else sighting.reason
 
     def _observe_play(self, sighting: TrackSighting, seen_rad: Array) -> None:
         """Learn the joints' play from a target at rest that is seen by eyes at rest."""

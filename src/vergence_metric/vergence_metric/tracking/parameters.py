@@ -164,6 +164,14 @@ class TrackerParameters(Parameters):
     anchor_px: int = parameter(
         6, "half side of the search that corrects the drift of a requested point", unit="px", minimum=2, maximum=40
     )
+    place_spread_px: float = parameter(
+        6.0,
+        "distance beside a requested point up to which its surroundings may look the same; beyond it the place is "
+        "not certain",
+        unit="px",
+        minimum=1.0,
+        maximum=100.0,
+    )
     depth_memory: float = parameter(
         0.85,
         "share of the weights of a requested target's possible distances that the next pair leaves",

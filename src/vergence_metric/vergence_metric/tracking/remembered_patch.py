@@ -28,6 +28,7 @@ _CANDIDATES = 3
 _APART_PX = 12.0  # two peaks of the context closer than this are one place
 _REFINED_WITHIN_PX = 4
 _LEAST_CONTRAST = 1.0  # standard deviation of a template [grey levels]
+_AS_ALIKE = 0.01  # difference in correlation below which two places look alike
 _PRIOR, _WIDE_PRIOR, _POINT_PRIOR = 0.05, 0.15, 0.03  # similarity by which a place at the rim of its search is worse
 
 Sides = tuple[int, int, int, int]
@@ -38,12 +39,13 @@ class PatchSighting:
     """Where the point is in the image now.
 
     `similarity` is the correlation of the point's surroundings with the remembered ones, `at_point` that of what lies
-    at the point itself (-1 to 1).
+    at the point itself (-1 to 1). `spread_px` is how far from it a place looks as much like it: far along an edge.
     """
 
     pixel: Pixel
     similarity: float
     at_point: float
+    spread_px: float = 0.0
 
 
 class RememberedPatch:
@@ -62,10 +64,11 @@ class RememberedPatch:
         height, width = image.shape
         if not (-reach_px <= expected[0] < width + reach_px and -reach_px <= expected[1] < height + reach_px):
             return None
-        wide = self._places(image, view, expected, reach, (_WIDE_HALF_PX, _WIDE_SCALE), 1, prior)
+        wide, wide_spread_px = self._places(image, view, expected, reach, (_WIDE_HALF_PX, _WIDE_SCALE), 1, prior)
         if wide and wide[0][1] >= _WIDE_SIMILARITY:
             expected, reach, prior = wide[0][0], _WIDE_REACH_PX, _WIDE_PRIOR
-        places = self._places(image, view, expected, reach, (_CONTEXT_HALF_PX, _CONTEXT_SCALE), _CANDIDATES, prior)
+        size = (_CONTEXT_HALF_PX, _CONTEXT_SCALE)
+        places, spread_px = self._places(image, view, expected, reach, size, _CANDIDATES, prior)
         if not places:
             return None
         template, sides = self._template(image, view, expected, (_POINT_HALF_PX, 1))
@@ -75,7 +78,7 @@ class RememberedPatch:
             off = math.hypot(place[0] - expected[0], place[1] - expected[1]) / reach
             found.append((similarity + at_point - prior * off**2, similarity, at_point, pixel))
         _, similarity, at_point, pixel = max(found)
-        return PatchSighting(pixel, similarity, at_point)
+        return PatchSighting(pixel, similarity, at_point, min(spread_px, wide_spread_px))
 
     def refine(self, image: Image, view: EyeView, pixel: Pixel, reach_px: int) -> tuple[PatchSighting, float]:
         """Return where the point itself is within `reach_px` of a pixel, and its similarity at that pixel.
@@ -121,17 +124,23 @@ class RememberedPatch:
         size: tuple[int, int],
         most: int,
         prior: float,
-    ) -> list[tuple[Pixel, float]]:
-        """Return up to `most` places of the template of a size, the best first, with their correlation."""
+    ) -> tuple[list[tuple[Pixel, float]], float]:
+        """Return up to `most` places of the template of a size, the best first, with their correlation.
+
+        The second value is how far from the best one the surface is as high [px].
+        """
         scale, reach = size[1], -(-reach_px // size[1])
         template, sides = self._template(image, view, expected, size)
         if float(template.std()) < _LEAST_CONTRAST:
-            return []
+            return [], float(reach_px)
         at = (round(expected[0]), round(expected[1]))
         left, top, right, bottom = (scale * (side + reach) for side in sides)
         area = cut(image, at[0] - left, at[1] - top, left + right + scale, top + bottom + scale)
         surface = _correlation(_reduced(area, scale), template)
         ranked = surface - _cost(surface, prior)
+        j, i = divmod(int(ranked.argmax()), ranked.shape[1])
+        rows, columns = np.nonzero(surface >= surface[j, i] - _AS_ALIKE)
+        spread_px = scale * float(np.hypot(rows - j, columns - i).max())
         middle_px = 0.5 * (scale - 1) - scale * reach
         places: list[tuple[Pixel, float]] = []
         apart = max(int(_APART_PX) // scale, 1)
@@ -143,7 +152,7 @@ class RememberedPatch:
             place = (at[0] + scale * (i + di) + middle_px, at[1] + scale * (j + dj) + middle_px)
             places.append((place, float(surface[j, i])))
             ranked[max(j - apart, 0) : j + apart + 1, max(i - apart, 0) : i + apart + 1] = -2.0
-        return places
+        return places, spread_px
 
 
 def _reaches(image: Image, pixel: Pixel) -> tuple[float, float, float, float]:

@@ -10,7 +10,9 @@ from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_metric.tracking.request import StoredPair, TrackRequest
+from vergence_metric.tracking.sighted import in_both_eyes, in_left_eye
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
+from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_metric.tracking.tracked_target import Target, parallax
 
 USUAL_EXTENT_PX = (60.0, 60.0)
@@ -60,6 +62,39 @@ def weigh_depths(
     return answered is depths.best
 
 
+def track_requested(
+    target: Target,
+    depths: DepthHypotheses,
+    sighting: Sighting,
+    pair: StoredPair,
+    estimator: DisparityEstimator,
+    largest_spread_px: float,
+) -> Track:
+    """Return the track of a requested target that was found in the left eye: at its likeliest distance so far.
+
+    It is AMBIGUOUS while no distance is certain, or while places farther than `largest_spread_px` look as much like it.
+    """
+    views = pair.views
+    expected_px = target.expected_disparity(sighting.pixel, views) if depths.certain else None
+    disparity = estimator.estimate(pair.left, pair.right, sighting.pixel, expected_px)
+    likeliest = weigh_depths(target, depths, disparity, sighting.pixel, views)
+    target.appearance.accept(pair.left, sighting, renew=disparity.ok)
+    target.update_direction(pair.stamp_s, views[0].direction(sighting.pixel))
+    track = in_left_eye(target, sighting, disparity.reason or "another distance is likelier")
+    ranked = [(target.disparity_of(one.parallax_rad, sighting.pixel, views), one.weight) for one in depths.ranked]
+    track = replace(track, candidates=tuple((d, weight) for d, weight in ranked if d is not None))
+    if likeliest:
+        track = in_both_eyes(track, target, disparity, views, pair.stamp_s)
+    if not depths.certain:
+        several = len(depths.ranked) > 1
+        reason = "the target may be at one of several distances" if several else "the target's distance is not certain"
+        return replace(track, status=TrackStatus.AMBIGUOUS, reason=reason)
+    if sighting.spread_px > largest_spread_px:
+        reason = f"the target's place is not certain: {sighting.spread_px:.0f} px beside it looks the same"
+        return replace(track, status=TrackStatus.AMBIGUOUS, reason=reason, candidates=())
+    return track
+
+
 def find_by_surroundings(
     target: Target, patch: RememberedPatch, left: Image, stamp_s: float, view: EyeView, parameters: TrackerParameters
 ) -> Sighting | None:
@@ -88,7 +123,7 @@ def find_by_surroundings(
         target.found = True
     else:
         target.appearance.drop_features()
-    return Sighting(found.pixel, found.similarity, 0)
+    return Sighting(found.pixel, found.similarity, 0, found.spread_px)
 
 
 def without_drift(

@@ -28,11 +28,15 @@ _MAX_SCALE_STEP = 0.08
 
 @dataclass(frozen=True)
 class Sighting:
-    """Position of the target [px], similarity to its appearance (correlation, -1..1), number of features followed."""
+    """Position of the target [px], similarity to its appearance (correlation, -1..1), number of features followed.
+
+    `spread_px` is how far from the position another looks as much like the target's surroundings.
+    """
 
     pixel: Pixel
     similarity: float
     features: int
+    spread_px: float = 0.0
 
 
 class TargetAppearance:

@@ -20,7 +20,6 @@ import numpy as np
 
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
 from vergence_metric.pairs.frame_motion import frame_motion_px
-from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair, TrackRequest
@@ -28,20 +27,20 @@ from vergence_metric.tracking.requested_target import (
     USUAL_EXTENT_PX,
     find_by_surroundings,
     requested_target,
-    weigh_depths,
+    track_requested,
     without_drift,
 )
 from vergence_metric.tracking.saccade_detector import EyeMotion, SaccadeDetector, StampedEyeAngles
 from vergence_metric.tracking.segmentation import Segmenter, is_plausible, offset_inside
+from vergence_metric.tracking.sighted import in_both_eyes, in_left_eye
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
-from vergence_metric.tracking.track import NOWHERE, Track, TrackStatus
+from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_metric.tracking.tracked_target import Target
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 
 _UNMISTAKABLE_SIMILARITY = 0.8
 _KEPT_SHARE = 0.9  # of a saccade: the largest distance from the fovea at which the target was not left
-_CONFIDENCE_WITHOUT_DISPARITY = 0.6
 
 
 class TargetTracker:
@@ -195,8 +194,9 @@ class TargetTracker:
         if target.depths is not None:
             if saccading:
                 # The servos are not where they report: what the eyes pass is no evidence of where the target is.
-                return self._in_left_eye(target, sighting, "the eyes are in a saccade")
-            return self._follow_requested(target, target.depths, sighting, left, right, views)
+                return in_left_eye(target, sighting, "the eyes are in a saccade")
+            pair = StoredPair(stamp_s, left, right, views)
+            return track_requested(target, target.depths, sighting, pair, self._estimator, p.place_spread_px)
         fixated = target.fixated_px(sighting.pixel)
         expected_px = target.expected_disparity(fixated, views)
         disparity = self._estimator.estimate(left, right, fixated, expected_px)
@@ -220,31 +220,6 @@ class TargetTracker:
         target.appearance.accept(left, sighting, renew=disparity.ok)
         target.update_direction(stamp_s, views[0].direction(sighting.pixel))
         return self._visible(target, sighting, disparity, views)
-
-    def _follow_requested(
-        self,
-        target: Target,
-        depths: DepthHypotheses,
-        sighting: Sighting,
-        left: Image,
-        right: Image,
-        views: tuple[EyeView, EyeView],
-    ) -> Track:
-        """Return the track of a requested target that was found in the left eye: at its likeliest distance so far."""
-        expected_px = target.expected_disparity(sighting.pixel, views) if depths.certain else None
-        disparity = self._estimator.estimate(left, right, sighting.pixel, expected_px)
-        likeliest = weigh_depths(target, depths, disparity, sighting.pixel, views)
-        target.appearance.accept(left, sighting, renew=disparity.ok)
-        target.update_direction(self._stamp_s, views[0].direction(sighting.pixel))
-        track = self._in_left_eye(target, sighting, disparity.reason or "another distance is likelier")
-        ranked = [(target.disparity_of(one.parallax_rad, sighting.pixel, views), one.weight) for one in depths.ranked]
-        track = replace(track, candidates=tuple((d, weight) for d, weight in ranked if d is not None))
-        if likeliest:
-            track = self._in_both_eyes(track, target, disparity, views)
-        if depths.certain:
-            return track
-        fit = f"{len(depths.ranked)} distances fit" if len(depths.ranked) > 1 else "its distance is not certain"
-        return replace(track, status=TrackStatus.AMBIGUOUS, reason=fit)
 
     def _find(self, target: Target, left: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Sighting | None:
         """Return the best sighting in the left image; None if it is predicted outside."""
@@ -277,45 +252,10 @@ class TargetTracker:
     ) -> Track:
         """Return the track of a target that was found in the left eye."""
         expected_px = target.expected_disparity(target.fixated_px(sighting.pixel), views)
-        track = self._in_left_eye(target, sighting, disparity.reason)
+        track = in_left_eye(target, sighting, disparity.reason)
         if not is_plausible(disparity, expected_px, self._parameters.disparity_jump_px):
             return track
-        return self._in_both_eyes(track, target, disparity, views)
-
-    def _in_left_eye(self, target: Target, sighting: Sighting, reason: str) -> Track:
-        similarity = min(max((sighting.similarity - 0.3) / 0.6, 0.0), 1.0)
-        scale = target.appearance.scale
-        return Track(
-            target.track_id,
-            target.lock_stamp_s,
-            sighting.pixel,
-            NOWHERE,
-            math.nan,
-            math.nan,
-            math.nan,
-            (target.appearance.extent_px[0] * scale, target.appearance.extent_px[1] * scale),
-            similarity * _CONFIDENCE_WITHOUT_DISPARITY,
-            TrackStatus.OCCLUDED,
-            f"target not found in the right eye: {reason}",
-            target.goal_id,
-        )
-
-    def _in_both_eyes(
-        self, track: Track, target: Target, disparity: Disparity, views: tuple[EyeView, EyeView]
-    ) -> Track:
-        shift = np.array([disparity.horizontal_px, disparity.vertical_px])
-        fixated = target.fixated_px(track.left_px)
-        target.update_parallax(self._stamp_s, fixated, views, (fixated[0] - shift[0], fixated[1] - shift[1]))
-        return replace(
-            track,
-            right_px=(track.left_px[0] - shift[0], track.left_px[1] - shift[1]),
-            disparity_px=disparity.horizontal_px,
-            vertical_px=disparity.vertical_px,
-            sigma_px=disparity.sigma_px,
-            confidence=track.confidence / _CONFIDENCE_WITHOUT_DISPARITY * (1.0 if disparity.ok else 0.8),
-            status=TrackStatus.OK,
-            reason="" if disparity.ok else disparity.reason,
-        )
+        return in_both_eyes(track, target, disparity, views, self._stamp_s)
 
 
 def _fovea(image: Image) -> Pixel:
