@@ -7,8 +7,8 @@ import pytest
 
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.control.report import Command
-from vergence_gaze.estimation.observations import JointReport, TrackSighting
-from vergence_gaze.goals.goal import Goal, GoalKind, Result, TrackRequest
+from vergence_gaze.estimation.observations import JointReport, Observation, TrackSighting
+from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, Result, TrackRequest
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.testing.fake_head import TICK_S, FakeHead, VisionModel
 from vergence_rig.rig import JOINT_NAMES, default_rig
@@ -86,3 +86,31 @@ def test_the_result_is_verged_on_the_point() -> None:
     head, controller = clicked(VisionModel(fovea=False))
     outcomes = [outcome for command in commands(head, controller, 3.0) for outcome in command.outcomes]
     assert [outcome.result for outcome in outcomes] == [Result.VERGED], outcomes
+
+
+def test_a_target_at_one_of_several_distances_is_not_verged_and_the_result_names_them() -> None:
+    head, controller = clicked(VisionModel(fovea=False))
+    outcomes: list[Outcome] = []
+    arrived: list[Observation] = []
+    ever = False
+    while head.time_s < 5.0:
+        for observation in head.advance():
+            if isinstance(observation, TrackSighting) and observation.goal_id:
+                here = observation.disparity_rad
+                observation = replace(
+                    observation,
+                    ambiguous=True,
+                    reason="the target may be at one of several distances",
+                    candidates=((here, 0.3), (here + 0.04, 0.25), (here - 0.2, 0.2)),
+                )
+            arrived.append(observation)
+        if round(head.time_s / TICK_S) % 6 == 0:
+            command = controller.step(head.time_s, arrived)
+            arrived = []
+            head.execute(command)
+            outcomes += command.outcomes
+            ever |= command.report.verged
+    assert not ever
+    assert [outcome.result for outcome in outcomes] == [Result.AMBIGUOUS], outcomes
+    assert "0.81 m, 0.54 m, far away" in outcomes[0].reason
+    assert np.abs(np.degrees(head.true_errors_rad())).max() < 0.5, "the eyes look at the likeliest"

@@ -12,7 +12,7 @@ Array = npt.NDArray[np.float64]
 
 _SMALLEST_MOVE_RAD = 1e-4
 _UNMOVED_RAD = 0.002  # an image that moves by less stands still, within its noise
-_MOST_RAD = 0.05
+_MOST_TIMES, _LEAST_LIMIT_RAD = 3.0, 0.0175  # more than this many times as described, or than this, is no play
 
 
 class PlayEstimator:
@@ -23,6 +23,8 @@ class PlayEstimator:
 
     def __init__(self, described_half_play_rad: Array, learning_share: float) -> None:
         self.half_play_rad: Array = described_half_play_rad.copy()
+        # A target that sets off is taken for lost motion once, before it is known to move.
+        self._most_rad = np.maximum(_MOST_TIMES * described_half_play_rad, _LEAST_LIMIT_RAD)
         self.learning_share = learning_share
         self._direction = np.zeros(3)
         self.restart()
@@ -58,4 +60,4 @@ class PlayEstimator:
             lost_rad = max(lost_rad, 2.0 * float(self.half_play_rad[i]))
         half_rad = float(self.half_play_rad[i])
         half_rad += self.learning_share * (0.5 * lost_rad - half_rad)
-        self.half_play_rad[i] = min(half_rad, _MOST_RAD)
+        self.half_play_rad[i] = min(half_rad, float(self._most_rad[i]))
