@@ -217,7 +217,10 @@ class Perception:
             self.judge.update_target(stamp_s, error, direction_error)
         # Eyes that passed over the target at the exposure are elsewhere by now; eyes that were on it for long stay.
         on_target = self._on_target(now_s) or self.judge.long_on_target(now_s)
-        steady = certain and on_target and not sweeping and not self.tracking.differing
+        # Since the exposure a correction may have begun: until it has ended, one eye is ahead of the other.
+        turned_rad = np.abs(self.history.reported_rad - self.history.reported_at(stamp_s))
+        correcting = not along and bool(turned_rad.max() > self.judge.enter_rad)
+        steady = certain and on_target and not sweeping and not correcting and not self.tracking.differing
         probability = 1.0
         # A target that moves, or may move, can be elsewhere by now: there one pair is never enough.
         if self.tracking.filter.surely_at_rest and not by_point and math.isfinite(visual.error_rad[1]):

@@ -12,7 +12,7 @@ Array = npt.NDArray[np.float64]
 
 _SMALLEST_MOVE_RAD = 1e-4
 _UNMOVED_RAD = 0.002  # an image that moves by less stands still, within its noise
-_MOST_TIMES, _LEAST_LIMIT_RAD = 3.0, 0.0175  # more than this many times as described, or than this, is no play
+_MOST_TIMES, _LEAST_LIMIT_RAD = 3.0, 0.02  # more than this many times as described, or than this, is no play
 
 
 class PlayEstimator:
