@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench.gaze_runs import travel_s
 from bench.photos_lockstep import Trace
 from vergence_rig.rig import Rig
 
@@ -66,7 +67,5 @@ def _arrived_s(trace: Trace, rig: Rig) -> float:
 def _bound_s(trace: Trace, rig: Rig) -> float:
     """Return the soonest possible [s]: first result of a pair after the click, the servos' latency and travel."""
     vergence, version, tilt = trace.start_errors_rad
-    ways = np.abs([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
-    servos = [joint.servo for _, joint in rig.joints.items()]
-    travel_s = float((ways / [servo.speed_rad_s for servo in servos]).max())
-    return trace.first_result_s + max(servo.command_latency_s for servo in servos) + travel_s
+    latency_s = max(joint.servo.command_latency_s for _, joint in rig.joints.items())
+    return trace.first_result_s + latency_s + travel_s(np.array([version, vergence, tilt]), rig)

@@ -111,6 +111,11 @@ class TargetTracking(TargetEstimator):
         """True if estimators have just differed, though not yet for long enough to be a disagreement."""
         return self._consistency.differing
 
+    @property
+    def _only_track_counts(self) -> bool:
+        """True where the tracker's answer alone shows the target: neither the fovea nor boxes do."""
+        return self._tracker_answers or self.point is not None
+
     def update_track(self, sighting: TrackSighting, now_s: float) -> bool:
         """Update by a track; returns True if it was the target's and was accepted."""
         answers = self._goal_id > 0 and sighting.goal_id == self._goal_id
@@ -189,7 +194,7 @@ class TargetTracking(TargetEstimator):
             self._consistency.update_fovea(stamp_s, vergence)
         self._depths.update_fovea(stamp_s, vergence)
         self._distractors.update_fovea(stamp_s, vergence, joints)
-        if self._tracker_answers or self.point is not None:
+        if self._only_track_counts:
             return False  # the fovea sees whatever lies there, the tracker what was asked for
         if self._consistency.track_is_fresh(stamp_s, _FRESH_S) and not self._depths.track_inconsistent:
             return False  # the tracker measures the target itself, the fovea only whatever lies there
@@ -216,12 +221,7 @@ class TargetTracking(TargetEstimator):
     def update_box(self, sighting: BoxSighting, now_s: float) -> bool:
         """Update by a detection; returns True if it was the target, by its class or its place, and was accepted."""
         by_class = self.class_name is not None
-        if (
-            self._tracker_answers
-            or self.point is not None
-            or not sighting.usable
-            or self.class_name not in (None, "", sighting.class_name)
-        ):
+        if self._only_track_counts or not sighting.usable or self.class_name not in (None, "", sighting.class_name):
             return False
         if not (by_class or (sighting.whole and self.filter.initialised)):
             return False

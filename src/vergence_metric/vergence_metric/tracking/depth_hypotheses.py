@@ -1,4 +1,4 @@
-"""The distances that a target may have: every pair's candidates are evidence, and none is believed at once.
+"""The distances that a target may have: every pair's candidates are evidence, and no single pair decides.
 
 A distance is kept as the target's parallax, the angle between both eyes' rays to it, which does not depend on where the
 eyes look. Joint angles of hobby servos shift it by up to a degree when the eyes turn: candidates are assigned to the

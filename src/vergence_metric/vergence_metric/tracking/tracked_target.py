@@ -64,11 +64,6 @@ class Target:
         while self.sightings[0][0] < stamp_s - _COAST_FROM_S:
             self.sightings.popleft()
 
-    @property
-    def speed_rad_s(self) -> float:
-        """Its speed over the recent sightings [rad/s], 0 while there are too few."""
-        return float(np.linalg.norm(self._steady_velocity()))
-
     def _steady_velocity(self) -> np.ndarray:
         """Return the velocity (3,) over the recent sightings, robust to single ones (Theil-Sen median slope).
 

@@ -174,7 +174,7 @@ class SteppedTime:
         deadline = time.monotonic() + _STAND_S
         asked_s = 0.0
         while True:
-            # Asked again where nobody may have subscribed yet.
+            # Asked again: the first request may have come before the subscription.
             if time.monotonic() - asked_s > 1.0:
                 asked_s = time.monotonic()
                 self._run_until.publish(Clock(clock=from_nanoseconds(time_ns)))
