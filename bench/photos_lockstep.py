@@ -117,7 +117,6 @@ class MetricOfPairs:
         measurement.update_alignment()
         return [
             gaze_messages.edge_contrast(edges),
-            gaze_messages.fovea_disparity(error, models[0].fx_px),
             gaze_messages.track_sighting(tracked, models[0]),
         ]
 

@@ -15,7 +15,7 @@ from vergence_gaze.estimation.observations import JointResolution, Observation, 
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
-from vergence_gaze.goals.goal_resolution import RequestedClass, RequestedPose, resolve_goal
+from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, resolve_goal
 from vergence_gaze.goals.requested_point import RequestedPoint
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.limits import CommandLimits
@@ -112,22 +112,20 @@ class GazeController:
         self._perception.judge.restart()
         self._law.reset()
         self._searcher.stop()
-        self._track_request = TrackRequest(0)
+        self._track_request, tracking = TrackRequest(0), self._perception.tracking
         if isinstance(request, RequestedPose):
-            self._perception.tracking.clear()
+            tracking.clear()
             self._pose = np.where(self._driven, request.joints_rad, np.nan)
-        elif isinstance(request, RequestedClass):
-            self._perception.tracking.request_class(now_s, request.class_name)
+        elif isinstance(request, ClassRequest):
+            tracking.request_class(request.class_name, goal_id)
         else:
-            seen = goal.kind in (GoalKind.PIXEL, GoalKind.STEREO_PIXEL)
-            if seen:
+            start = now_s, request.stamp_s, request.angles_rad, request.covariance, goal_id
+            if goal.kind is GoalKind.POINT:
+                tracking.request_point(*start)
+            else:
+                tracking.request_target(*start)
                 xy = goal.left_xy if goal.left_eye else goal.right_xy
                 self._track_request = TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy)
-            start = now_s, request.stamp_s, request.angles_rad, request.covariance
-            if goal.kind is GoalKind.POINT:
-                self._perception.tracking.request_point(*start, goal_id)
-            else:
-                self._perception.tracking.request_target(*start, goal_id if seen else 0)
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
 
@@ -183,6 +181,7 @@ class GazeController:
             self._perception.history.on_command(now_s)
         self._update_goal(now_s)
         request, self._track_request = self._track_request, None
+        request = self._perception.tracking.pop_track_request() or request
         return Command(sent if sending else None, self._report(now_s), self._goals.pop_outcomes(), request)
 
     def _observe(self, observation: Observation, now_s: float) -> None:
@@ -204,7 +203,7 @@ class GazeController:
 
     def _follow_stream(self, now_s: float) -> None:
         if not self._perception.tracking.follows_stream:
-            self._perception.tracking.request_stream(now_s)
+            self._perception.tracking.request_stream()
             self._track_request = TrackRequest(0)
             self._perception.judge.restart("the target is a stream of points")
             self._active, self._pose, self._verges_on_sight = True, None, False
@@ -214,7 +213,7 @@ class GazeController:
         if self._pose is not None:
             self._phases.enter(Phase.SACCADE, "turning to the requested angles", now_s)
             return self._pose
-        if self._verges_on_sight and not self._perception.tracking.filter.initialised:
+        if self._verges_on_sight and not self._perception.unseen_s(now_s) <= self._p.target.lost_after_s:
             self._verge_on_view(now_s)
         situation = self._situation(self._control_input(now_s, command))
         phase = self._phases.update(situation)
@@ -229,9 +228,6 @@ class GazeController:
             return _UNKNOWN
         if phase is Phase.SACCADE and self._perception.judge.verged:
             self._perception.judge.restart("a saccade to the target is under way")
-        if self._perception.tracking.disagreement:
-            self._phases.enter(Phase.VERGE, "estimators of the target's vergence disagree: holding still", now_s)
-            return _UNKNOWN
         return self._law.compute_command(self._control_input(now_s, command))
 
     def _look_at_point(self, point: RequestedPoint, s: Situation) -> None:
@@ -243,12 +239,16 @@ class GazeController:
         self._track_request = request or self._track_request
 
     def _verge_on_view(self, now_s: float) -> None:
+        """Ask the tracker for what the newest image of resting eyes shows at the left fovea."""
+        stamp_s, tracking = self._perception.exposure_s, self._perception.tracking
+        if not tracking.eyes_were_still(stamp_s, 0.0):
+            return
         self._phases.enter(Phase.VERGE, "no goal: verging on what the left eye looks at", now_s)
-        left, right, tilt = self._perception.history.shaft_rad
+        left, right, tilt = self._perception.history.shaft_at(stamp_s)
         spread = spread_of_eye(True, self._p.target.direction_sigma_rad, self._p.target.prior_vergence_sigma_rad)
-        self._perception.tracking.request_target(
-            now_s, now_s, np.array([0.5 * (left + right), right - left, tilt]), spread
-        )
+        angles_rad, goal_id = np.array([0.5 * (left + right), right - left, tilt]), self._goals.new_id()
+        tracking.request_target(now_s, stamp_s, angles_rad, spread, goal_id)
+        self._track_request = TrackRequest(goal_id, stamp_s, True, (0.0, 0.0))
 
     def _control_input(self, now_s: float, command: Array) -> ControlInput:
         return ControlInput(
@@ -306,7 +306,6 @@ class GazeController:
             in_phase_s=now_s - self._phases.since_s,
             image_s=self._perception.image_s,
             beyond_limits=self._beyond_limits,
-            disagreement=self._perception.tracking.disagreement,
             by_class=self._perception.tracking.class_name is not None,
             pose_reached=pose_reached,
             ambiguity=self._perception.tracking.ambiguity,

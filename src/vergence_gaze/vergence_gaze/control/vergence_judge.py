@@ -3,13 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from vergence_gaze.parameters import VergedParameters
+from vergence_gaze.verged_parameters import VergedParameters
 
-_CONTRAST_AGE_S = 0.5
-_SEEN_AGE_S = 1.0
-_PAIR_MATCH_S = 0.08
-_SAME_PAIR_S = 0.012
-_LONG_ON_TARGET_S, _SEEN_LATELY_S = 0.4, 0.4
+_SAME_PAIR_S = 0.012  # stamps of one pair, from two nodes, differ by less
 
 
 @dataclass(frozen=True)
@@ -90,15 +86,15 @@ class VergenceJudge:
 
     def long_on_target(self, now_s: float) -> bool:
         """Return whether the identified target was on the axes in every pair for a while, up to now."""
-        lately = now_s - self._target_s < _SEEN_LATELY_S
-        return lately and self._target_s - self._on_target_since_s >= _LONG_ON_TARGET_S
+        lately = now_s - self._target_s < self._p.followed_s
+        return lately and self._target_s - self._on_target_since_s >= self._p.followed_s
 
     def exposure_for(self, stamp_s: float, now_s: float) -> float:
         """Return the time at which a streamed point is judged: that of the newest image that counts; points are newer.
 
         So each image gives one verdict, however late it is.
         """
-        counts = self._p.contrast != "ignored" and now_s - self._contrast_s <= _SEEN_AGE_S
+        counts = self._p.contrast != "ignored" and now_s - self._contrast_s <= self._p.contrast_lost_s
         return min(stamp_s, self._contrast_s) if counts else stamp_s
 
     def update_pair(
@@ -116,7 +112,7 @@ class VergenceJudge:
 
         Args:
             stamp_s: the pair's stamp; every pair counts once, by its last measurement until `verged` is set, and by its
-                worst from then on: the fovea measures no direction.
+                worst from then on.
             now_s: the present.
             vergence_error_rad: the vergence error in that pair.
             steady: whether the estimate is certain enough.
@@ -175,16 +171,16 @@ class VergenceJudge:
 
     def _uses_contrast(self, now_s: float) -> bool:
         if self._p.contrast == "when_seen":
-            return now_s - self._contrast_s <= _SEEN_AGE_S
+            return now_s - self._contrast_s <= self._p.contrast_lost_s
         return self._p.contrast == "required"
 
     def _contrast_objection(self, stamp_s: float, now_s: float, limit: float) -> str:
         """Return why the contrast prevents `verged`; empty if it does not."""
         if not self._uses_contrast(now_s):
             return ""
-        if now_s - self._contrast_s > _SEEN_AGE_S:
+        if now_s - self._contrast_s > self._p.contrast_lost_s:
             return "no edge contrast arrives"
-        if stamp_s - self._contrast_s > _PAIR_MATCH_S + (_CONTRAST_AGE_S if self.verged else 0.0):
+        if not self.verged and stamp_s - self._contrast_s > self._p.contrast_age_s:
             return "the newest edge contrast is older than the disparity"
         if self.contrast <= limit:
             return ""

@@ -32,7 +32,6 @@ from vergence_msgs.msg import (
     GazeState,
     TargetTrack,
     TrackRequest,
-    VergenceError,
 )
 from vergence_rig.camera import CameraModel, CameraModelError
 from vergence_rig.rig import load_rig
@@ -73,9 +72,6 @@ class GazeControllerNode(Node):
             JointState, "servo_node/resolution", lambda m: self._add(convert.joint_resolution(m)), latched
         )
         watch.create_subscription(EdgeVergence, "vergence/edge", lambda m: self._add(convert.edge_contrast(m)))
-        watch.create_subscription(
-            VergenceError, "vergence/error", lambda m: self._add(convert.fovea_disparity(m, self._left.fx_px))
-        )
         watch.create_subscription(
             TargetTrack, "vergence/track", lambda m: self._add(convert.track_sighting(m, self._left))
         )
