@@ -2,40 +2,19 @@
 
 from dataclasses import dataclass
 
-from vergence_rig.parameters import ParameterError, Parameters, parameter
+from vergence_rig.parameters import ParameterError, parameter
+from vergence_rig.verged import VergedLimits
 
 
 @dataclass(frozen=True)
-class VergedParameters(Parameters):
-    """When the eyes are called verged."""
+class VergedParameters(VergedLimits):
+    """When the eyes are called verged: the limits of a pair, and how many pairs and which other evidence it takes."""
 
     contrast: str = parameter(
         "required",
         "role of the edge contrast in `verged`: needed for every pair, needed only while it arrives, or not used",
         choices=("required", "when_seen", "ignored"),
         formerly="contrast",
-    )
-    contrast_enter: float = parameter(
-        0.78,
-        "edge contrast up to which `verged` may be set",
-        minimum=0,
-        maximum=2,
-        formerly="contrast_enter",
-    )
-    contrast_leave: float = parameter(
-        0.9,
-        "edge contrast above which a pair counts against `verged` while it is set",
-        minimum=0,
-        maximum=2,
-        formerly="contrast_leave",
-    )
-    enter_rad: float = parameter(
-        0.0045,
-        "vergence error up to which `verged` may be set on a target at rest",
-        unit="rad",
-        minimum=1e-4,
-        maximum=0.2,
-        formerly="verged_enter_rad",
     )
     direction_rad: float = parameter(
         0.0085,
@@ -44,14 +23,6 @@ class VergedParameters(Parameters):
         unit="rad",
         minimum=1e-4,
         maximum=0.2,
-    )
-    leave_rad: float = parameter(
-        0.0155,
-        "vergence or direction error above which a pair counts against `verged` while it is set",
-        unit="rad",
-        minimum=1e-4,
-        maximum=0.2,
-        formerly="verged_leave_rad",
     )
     enter_pairs: int = parameter(
         2,
@@ -128,13 +99,8 @@ class VergedParameters(Parameters):
 
     def check(self) -> None:
         """Hold the hystereses in order."""
-        if self.contrast_leave < self.contrast_enter:
-            raise ParameterError(
-                "contrast_leave", self.contrast_leave, f"at least verged.contrast_enter, {self.contrast_enter:g}"
-            )
         if self.leave_rad < self.direction_rad:
             raise ParameterError(
                 "leave_rad", self.leave_rad, f"at least verged.direction_rad, {self.direction_rad:g} [rad]"
             )
-        if self.leave_rad < self.enter_rad:
-            raise ParameterError("leave_rad", self.leave_rad, f"at least verged.enter_rad, {self.enter_rad:g} [rad]")
+        super().check()

@@ -27,11 +27,11 @@ from vergence_msgs.msg import TrackRequest as TrackRequestMessage
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import eye_direction, eye_position
 from vergence_rig.rig import JOINT_NAMES
+from vergence_rig.verged import best_small_window
 
 Array = npt.NDArray[np.float64]
 
 BASE_FRAME = "rig_base"
-SMALL_WINDOWS_PX = (50, 150)
 _RAY_M = 2.0
 
 
@@ -114,13 +114,11 @@ def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
 
 def edge_contrast(message: EdgeVergence) -> EdgeContrast:
     """Return the least contrast of the small windows, which show vergence best, and the raw metric of that window."""
-    best = (math.nan, math.nan)
-    for size, contrast, left, right in zip(
-        message.windows_px, message.contrast, message.left_to_right_px, message.right_to_left_px, strict=False
-    ):
-        if SMALL_WINDOWS_PX[0] <= size <= SMALL_WINDOWS_PX[1] and not contrast >= best[0]:
-            best = (contrast, 0.5 * (left + right)) if math.isfinite(contrast) else best
-    return EdgeContrast(to_seconds(message.header.stamp), *best)
+    stamp_s, best = to_seconds(message.header.stamp), best_small_window(message.windows_px, message.contrast)
+    if best is None:
+        return EdgeContrast(stamp_s, math.nan, math.nan)
+    metric_px = 0.5 * (message.left_to_right_px[best] + message.right_to_left_px[best])
+    return EdgeContrast(stamp_s, message.contrast[best], metric_px)
 
 
 def eye_rotation(message: EyeRotation) -> EyeRotationObservation:

@@ -109,10 +109,14 @@ class FakeHead:
     def execute(self, command: Command) -> None:
         """Do what a controller's cycle asks for: turn the joints, and track for a goal."""
         if command.track_request is not None:
-            self._goal_id, self._lock_s = command.track_request.goal_id, self.time_s
-            self._track_id += 1
+            self.track_for(command.track_request.goal_id)
         if command.joints_rad is not None:
             self.command(command.joints_rad)
+
+    def track_for(self, goal_id: int) -> None:
+        """Track the target on behalf of a goal from now on; 0 ends that."""
+        self._goal_id, self._lock_s = goal_id, self.time_s
+        self._track_id += 1
 
     def true_errors_rad(self) -> Array:
         """Return (version, vergence, tilt) to the target minus the true ones (3,)."""

@@ -41,7 +41,7 @@ class EdgeMetricResult:
 
     `left_grey` and `right_grey` (h, w) uint8 are the images compared, the right one aligned. Arrays carry
     the names of vergence_msgs/EdgeVergence; values are float64, NaN where `status` (WindowStatus) gives a reason.
-    `foveal_contrast` is the input of FovealVergenceClassifier. `stage_s` is the duration of each stage [s].
+    `foveal_contrast` is weighted by a Gaussian about the centre. `stage_s` is the duration of each stage [s].
     """
 
     windows: tuple[Window, ...]
