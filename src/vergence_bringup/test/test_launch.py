@@ -64,7 +64,7 @@ def nodes(file, **arguments):
 
 def parameters(node, context):
     """Return a node's parameters beyond its YAML file. Launch has no public way to read them."""
-    values = {}
+    values: dict[str, object] = {}
     for part in evaluate_parameters(context, node._Node__parameters):
         values |= part if isinstance(part, dict) else {}
     return values
@@ -186,7 +186,7 @@ def test_a_head_on_fakes_says_so_in_big_letters(arguments, fake):
     ],
 )
 def test_wrong_values_end_the_launch_before_anything_starts(file, arguments, problem):
-    context, started = LaunchContext(), []
+    context, started = LaunchContext(), list[Node]()
     included = IncludeLaunchDescription(
         PythonLaunchDescriptionSource(str(LAUNCH / file)), launch_arguments=(REQUIRED[file] | arguments).items()
     )
