@@ -11,7 +11,7 @@ from typing import Any
 from launch import LaunchDescription
 from launch.actions import LogInfo, SetEnvironmentVariable
 
-from vergence_bringup.launching.servo_choice import FAKES, chosen_backend, problems
+from vergence_bringup.launching.servo_choice import chosen_backend, fakes_banner, problems
 from vergence_bringup.ros.launch_actions import described, head, node
 
 
@@ -19,9 +19,10 @@ def build(values: Mapping[str, str]) -> list[Any]:
     own = {"rig": values["rig"], "servos": values["servos"], "start": values["start"]}
     own["backend"] = chosen_backend(values)
     # After a crash the next start releases servos that were left driven.
+    fakes = fakes_banner(values)
     servo_node = node("servo_node", values["params_file"], respawn=True, parameters=own)
     return [
-        *([LogInfo(msg=FAKES)] if own["backend"] == "fake" else []),
+        *([LogInfo(msg=fakes)] if fakes else []),
         SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", values["discovery_range"]),
         *head(values, servo_node),
     ]

@@ -12,7 +12,7 @@ from typing import Any
 from launch import LaunchDescription
 from launch.actions import LogInfo
 
-from vergence_bringup.launching.servo_choice import FAKES, chosen_backend, problems
+from vergence_bringup.launching.servo_choice import chosen_backend, fakes_banner, problems
 from vergence_bringup.ros.launch_actions import config_folder, described, head, node
 
 
@@ -55,9 +55,9 @@ def build(values: Mapping[str, str]) -> list[Any]:
         nodes.append(seeing("eye_rotation_node"))
     if values["servo_node"] == "false":
         return head(values, *nodes)
-    backend = chosen_backend(values)
-    nodes.append(seeing("servo_node", backend=backend, servos=values["servos"]))
-    return ([LogInfo(msg=FAKES)] if backend == "fake" else []) + head(values, *nodes)
+    nodes.append(seeing("servo_node", backend=chosen_backend(values), servos=values["servos"]))
+    fakes = fakes_banner(values)
+    return [*([LogInfo(msg=fakes)] if fakes else []), *head(values, *nodes)]
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -8,7 +8,7 @@ import pytest
 
 from vergence_bringup.launching.arguments import ARGUMENTS, defaults, problems, unknown
 from vergence_bringup.launching.endings import OPTIONAL, ending
-from vergence_bringup.launching.servo_choice import FAKES, chosen_backend
+from vergence_bringup.launching.servo_choice import chosen_backend, fakes_banner
 from vergence_bringup.launching.servo_choice import problems as servo_problems
 from vergence_bringup.node_table import NODES
 
@@ -109,10 +109,33 @@ def test_servos_that_could_not_be_driven_are_named(servos, backend, problem):
     assert problem in found
 
 
-def test_a_head_on_fakes_says_so_in_big_letters():
-    assert "NO SERVO MOVES" in FAKES
-    assert "servos:=" in FAKES
-    assert "!!!!!!!!!!" in FAKES
+def test_a_head_on_fakes_says_so_in_big_letters(tmp_path):
+    text = fakes_banner({"servos": "", "backend": ""})
+    assert "NO SERVO MOVES: this head" in text
+    assert "servos:=" in text
+    assert "!!!!!!!!!!" in text
+    assert fakes_banner({"servos": SERVOS, "backend": ""}) == ""
+    path = tmp_path / "servos.yaml"
+    path.write_text("servos: {pan_left: {channel: 0}, pan_right: {channel: 1}, tilt: {channel: 0, backend: fake}}\n")
+    mixed = {"servos": str(path), "backend": ""}
+    assert servo_problems(mixed) == []
+    assert "NO SERVO MOVES: tilt of this head" in fakes_banner(mixed)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "problem"),
+    [
+        ("{channel: 0, backend: pca9685}", ""),
+        ("{channel: 0, backend: pca9865}", "servos.tilt.backend must be one of"),
+        ("{channel: 0, backend: kernel_pwm}", "different channel of backend 'kernel_pwm': got 0 for pan_left and tilt"),
+    ],
+)
+def test_a_servo_may_name_its_own_backend(tilt, problem, tmp_path):
+    path = tmp_path / "servos.yaml"
+    path.write_text(f"servos: {{pan_left: {{channel: 0}}, pan_right: {{channel: 1}}, tilt: {tilt}}}\n")
+    found = servo_problems({"servos": str(path), "backend": ""})
+    assert problem in "".join(found)
+    assert bool(found) == bool(problem)
 
 
 def test_a_node_without_which_a_head_still_verges_does_not_end_it():

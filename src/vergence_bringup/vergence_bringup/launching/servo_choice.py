@@ -3,19 +3,15 @@
 from collections.abc import Mapping
 
 from vergence_rig.banner import banner
+from vergence_rig.rig import JOINT_NAMES
 from vergence_servo.calibration import ServoCalibrationError, load_servos
+from vergence_servo.driver_set import backends_of
 from vergence_servo.drivers.protocol import DriverUnavailableError
 from vergence_servo.drivers.registry import find_backend
 
-FAKES = banner(
-    "NO SERVO MOVES: this head runs on fake servos",
-    "for a real one: servos:=/path/of/your/servos.yaml (and backend:=, if not kernel_pwm); see docs/servos.md",
-)
-"""Shown at the start of a head whose servos are simulated."""
-
 
 def chosen_backend(values: Mapping[str, str]) -> str:
-    """Return the backend of a launch file's arguments: the one given, else kernel_pwm with servos, fake without."""
+    """Return the backend of the servos that name none: the one given, else kernel_pwm with servos, fake without."""
     return values["backend"] or ("kernel_pwm" if values["servos"] else "fake")
 
 
@@ -24,7 +20,7 @@ def problems(values: Mapping[str, str]) -> list[str]:
     try:
         backend = find_backend(chosen_backend(values))
         if values["servos"]:
-            load_servos(values["servos"])
+            _backends(values)
     except DriverUnavailableError as error:
         return [str(error).replace("parameter 'backend'", "backend")]
     except ServoCalibrationError as error:
@@ -35,3 +31,21 @@ def problems(values: Mapping[str, str]) -> list[str]:
             "whose channels are your wiring's: got none"
         ]
     return []
+
+
+def fakes_banner(values: Mapping[str, str]) -> str:
+    """Return what is shown at the start of a head whose servos, or some of them, are simulated; "" for a real one."""
+    moving = {joint: find_backend(backend).moves_servos for joint, backend in _backends(values).items()}
+    if all(moving.values()):
+        return ""
+    still = [joint for joint, moves in moving.items() if not moves]
+    which = f"{', '.join(still)} of this head" if any(moving.values()) else "this head"
+    return banner(
+        f"NO SERVO MOVES: {which} runs on fake servos",
+        "for a real one: servos:=/path/of/your/servos.yaml (and backend:=, if not kernel_pwm); see docs/servos.md",
+    )
+
+
+def _backends(values: Mapping[str, str]) -> dict[str, str]:
+    servos = load_servos(values["servos"])
+    return backends_of(servos, [joint for joint in JOINT_NAMES if joint in servos], chosen_backend(values))
