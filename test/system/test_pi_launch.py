@@ -101,7 +101,7 @@ def test_a_configuration_that_servo_node_refuses_ends_the_launch(start: Start, t
     assert launch.process.wait(PATIENCE_S) == 0
     assert launch.said.count("process started") == 1
     assert "exit code 2" in launch.said
-    assert "servo_node ended (its configuration cannot be used)" in launch.said
+    assert "servo_node ended (it could not start)" in launch.said
 
 
 def test_a_crash_is_followed_by_a_new_start_and_a_clean_end_is_the_end(start: Start) -> None:

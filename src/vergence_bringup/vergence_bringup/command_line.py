@@ -5,6 +5,8 @@ import importlib
 import sys
 from collections.abc import Sequence
 
+from vergence_bringup.machine import build_hint
+
 COMMANDS = {
     "demo": ("vergence_bringup.demo.ros.command", "run the graph on the simulated head and write a report"),
     "measure": ("vergence_bringup.commands.measure", "compute metric I (and II) of two stored images"),
@@ -22,7 +24,11 @@ COMMANDS = {
 def main(args: Sequence[str] | None = None) -> int:
     """Run one subcommand and return its exit status: 0 success, 1 a check failed, 2 invalid input, 130 Ctrl-C."""
     try:
-        options = _options(args)
+        try:
+            options = _options(args)
+        except ModuleNotFoundError as error:
+            print(f"vergence: this command needs {error.name}: {_missing(error.name or '')}", file=sys.stderr)
+            return 2
         try:
             return int(options.run(options))
         except (ValueError, OSError) as error:
@@ -30,6 +36,12 @@ def main(args: Sequence[str] | None = None) -> int:
             return 2
     except KeyboardInterrupt:
         return 130
+
+
+def _missing(module: str) -> str:
+    if module.startswith("vergence_"):
+        return f"the package is not built here, or this shell does not have it ({build_hint()})"
+    return "it is not installed here (vergence doctor says how to install it)"
 
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:

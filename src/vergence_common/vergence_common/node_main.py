@@ -1,5 +1,6 @@
 """The one way in which every node starts, spins and ends."""
 
+import os
 import signal
 import sys
 import threading
@@ -15,12 +16,16 @@ from vergence_common.memory import keep_large_blocks
 STATUS_BAD_INPUT = 2
 
 
+class StartAbandonedError(Exception):
+    """Raised while a node is made and asked to end, by one whose own thread cannot stop what it is doing at once."""
+
+
 def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -> int:
     """Make a node, spin it on one thread until SIGINT, SIGTERM or shutdown, close it, and return the exit status.
 
     The node's own `close()`, where it has one, releases hardware and joins its threads. A ValueError while the node
     is made (a wrong parameter, rig or calibration) is one line on standard error and status 2; so is a parameter file
-    that cannot be read. A clean end is status 0.
+    that cannot be read. A clean end is status 0, also of a node that ends while it is being made.
     """
     keep_large_blocks()
     stop_asked = threading.Event()
@@ -41,6 +46,12 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
         node = make_node()
         executor.add_node(node)
         executor.spin()
+    except StartAbandonedError:
+        # Its thread holds no hardware; waiting for it, or tearing the interpreter down beside it, would be wrong.
+        rclpy.try_shutdown()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
     except ExternalShutdownException:
         pass
     except Exception as error:

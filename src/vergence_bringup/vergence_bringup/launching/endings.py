@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from vergence_rig.banner import banner
 
 CLEAN_END, REFUSED = 0, 2
-"""Exit statuses of every node: ended by request, and configuration that cannot be used."""
+"""Exit statuses of every node: ended by request, and what it was given cannot be used."""
 OPTIONAL = {
     "box_metric_node": "metric II and goals by class",
     "eye_rotation_node": "the visual encoder of the eyes' angles",
@@ -42,5 +42,5 @@ def _status(status: int) -> str:
     if status == CLEAN_END:
         return "by request"
     if status == REFUSED:
-        return "its configuration cannot be used"
+        return "it could not start"
     return f"killed by signal {-status}" if status < 0 else f"exit status {status}"

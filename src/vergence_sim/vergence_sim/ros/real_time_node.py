@@ -13,6 +13,7 @@ from std_msgs.msg import Header
 
 from vergence_common.diagnostics import OK, WARN, Diagnostics, Report
 from vergence_common.images import array_to_compressed, array_to_image
+from vergence_common.node_main import StartAbandonedError
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import to_nanoseconds, to_stamp
@@ -26,6 +27,7 @@ from vergence_sim.ros.sim_messages import camera_info, joint_state
 from vergence_sim.world import EYES, Picture, World
 
 _ROUNDING_S = 1e-6
+_ASKED_EVERY_S = 0.05
 
 
 class RealTimeNode(Node):
@@ -72,8 +74,11 @@ class RealTimeNode(Node):
         self._start_s = START_NS * 1e-9
         self._thread = threading.Thread(target=self._run, name="simulation", daemon=True)
         self._thread.start()
-        # A world that cannot start ends the node with its reason.
-        self._started.wait()
+        # A world that cannot start ends the node with its reason. Making one takes seconds: a node that is asked to end
+        # meanwhile does not wait for it.
+        while not self._started.wait(_ASKED_EVERY_S):
+            if not self.context.ok():
+                raise StartAbandonedError
         if self._failure is not None:
             raise OSError(str(self._failure)) from self._failure
 
