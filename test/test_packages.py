@@ -25,7 +25,7 @@ OF_ONE_DRIVER = {"adafruit_pca9685", "board", "busio", "lgpio", "pigpio"}
 """Imported only where the servos of that driver are."""
 IF_INSTALLED = {"skimage"}
 """Imported only where it is installed, and not needed."""
-LAUNCHED = {path.name for path in PACKAGES}
+LAUNCHED = {path.name for path in PACKAGES} | {"robot_state_publisher"}
 """What vergence_bringup starts, whether it imports it or not."""
 
 each_package = pytest.mark.parametrize("package", PACKAGES, ids=lambda path: path.name)

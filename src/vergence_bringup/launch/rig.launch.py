@@ -13,7 +13,7 @@ from launch import LaunchDescription
 from launch.actions import LogInfo
 
 from vergence_bringup.launching.servo_choice import chosen_backend, fakes_banner, problems
-from vergence_bringup.ros.launch_actions import config_folder, described, head, node
+from vergence_bringup.ros.launch_actions import config_folder, described, frames, head, node
 
 
 def camera(eye: str, values: Mapping[str, str]) -> Any:
@@ -47,7 +47,7 @@ def build(values: Mapping[str, str]) -> list[Any]:
     def seeing(executable: str, **parameters: str) -> Any:
         return node(executable, *files(executable, values), parameters={"rig": values["rig"], **parameters})
 
-    nodes = [camera("left", values), camera("right", values)]
+    nodes = [*frames(values), camera("left", values), camera("right", values)]
     nodes += [seeing("edge_metric_node"), seeing("gaze_controller_node")]
     if values["detector"] == "true":
         nodes.append(seeing("box_metric_node", **{"detector.model": values["model"]}))

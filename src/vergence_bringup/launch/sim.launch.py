@@ -9,7 +9,7 @@ from typing import Any
 
 from launch import LaunchDescription
 
-from vergence_bringup.ros.launch_actions import described, head, node
+from vergence_bringup.ros.launch_actions import described, frames, head, node
 
 
 def build(values: Mapping[str, str]) -> list[Any]:
@@ -18,7 +18,8 @@ def build(values: Mapping[str, str]) -> list[Any]:
     executables += ["box_metric_node"] * (values["detector"] == "true")
     executables += ["eye_rotation_node"] * (values["encoder"] == "true")
     own = {"sim_node": {"preset": values["preset"]}}
-    return head(values, *(node(name, parameters=shared | own.get(name, {})) for name in executables))
+    nodes = [node(name, parameters=shared | own.get(name, {})) for name in executables]
+    return head(values, *nodes, *frames(values, use_sim_time=shared["use_sim_time"]))
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -20,8 +20,10 @@ from launch.actions import EmitEvent, IncludeLaunchDescription, LogInfo
 from launch.events.process import ProcessExited
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.utilities import perform_substitutions
-from launch_ros.actions import Node
+from launch_ros.actions import Node, SetRemap
 from launch_ros.utilities import evaluate_parameters
+
+from vergence_bringup.ros import launch_actions
 
 LAUNCH = Path(__file__).resolve().parents[1] / "launch"
 SERVOS = Path(__file__).resolve().parents[1] / "config" / "servos.yaml"
@@ -35,9 +37,10 @@ REQUIRED = {
 
 
 @pytest.fixture(autouse=True)
-def untouched_environment(monkeypatch):
-    # SetEnvironmentVariable writes to this process's environment.
+def same_everywhere(monkeypatch):
+    # SetEnvironmentVariable writes to this process's environment; a machine may have robot_state_publisher or not.
     monkeypatch.setattr(os, "environ", os.environ.copy())
+    monkeypatch.setattr(launch_actions, "_installed", lambda package: False)
 
 
 def actions(file, arguments, context=None):
@@ -200,6 +203,27 @@ def test_an_argument_that_does_not_exist_ends_the_launch(monkeypatch):
     monkeypatch.setattr(sys, "argv", ["ros2", "launch", "vergence_bringup", "sim.launch.py", "detectr:=false"])
     with pytest.raises(ValueError, match="did you mean 'detector'"):
         nodes("sim.launch.py", detectr="false")
+
+
+@pytest.mark.parametrize("file", ["sim.launch.py", "rig.launch.py", "laptop.launch.py"])
+def test_the_heads_frames_are_published_where_that_is_possible(file, monkeypatch, tmp_path):
+    rig = tmp_path / "rig.yaml"
+    rig.write_text("baseline_m: 0.08\n")
+    assert "robot_state_publisher" not in dict(nodes(file))
+    with pytest.raises(ValueError, match="ros-jazzy-robot-state-publisher"):
+        nodes(file, frames="true")
+    monkeypatch.setattr(launch_actions, "_installed", lambda package: True)
+    given = dict(nodes(file, rig=str(rig)))["robot_state_publisher"]
+    assert 'xyz="0 0.04 0"' in given["robot_description"]
+    assert "robot_state_publisher" not in dict(nodes(file, frames="false"))
+
+
+@pytest.mark.parametrize("file", sorted(ARGUMENTS))
+def test_a_head_in_a_namespace_has_a_tf_tree_of_its_own(file):
+    context = LaunchContext()
+    remaps = [action for action in actions(file, REQUIRED[file], context) if isinstance(action, SetRemap)]
+    pairs = {tuple(perform_substitutions(context, part) for part in (remap.src, remap.dst)) for remap in remaps}
+    assert pairs == {("/tf", "tf"), ("/tf_static", "tf_static")}
 
 
 @pytest.mark.parametrize(

@@ -65,6 +65,12 @@ _NAMESPACE = LaunchArgument("namespace", "namespace of all nodes of the head")
 _RIG = _file("rig", "path of rig.yaml", shipped="rig.yaml")
 _PROFILE = _file("fastdds_profile", "Fast DDS profile", shipped="fastdds.xml")
 _ENCODER = _switch("encoder", "run eye_rotation_node, the visual encoder of the eyes' angles", "true")
+_FRAMES = LaunchArgument(
+    "frames",
+    "run robot_state_publisher, which publishes the head's frames on tf; auto: where it is installed",
+    "auto",
+    ("auto", "true", "false"),
+)
 _RANGE = LaunchArgument(
     "discovery_range",
     "how far nodes are discovered; the other machine must be in it",
@@ -85,6 +91,7 @@ _CAMERAS_AND_VISION = (
     _file("model", "ONNX file of the detector; empty for the one of the simulator's cube"),
     _switch("lock", "hold one exposure and white balance for both cameras", "true"),
     _ENCODER,
+    _FRAMES,
     _PROFILE,
 )
 
@@ -97,6 +104,7 @@ ARGUMENTS: dict[str, tuple[LaunchArgument, ...]] = {
             "detector", "run box_metric_node, whose detector finds the simulator's cube; needs onnxruntime", "true"
         ),
         _ENCODER,
+        _FRAMES,
         _switch(
             "use_sim_time",
             "simulated time: sim_node publishes /clock, which waits for the nodes that follow it",

@@ -20,6 +20,7 @@ from vergence_common.stamps import to_nanoseconds, to_stamp
 from vergence_rig.parameters import Groups
 from vergence_rig.rig import JOINT_NAMES
 from vergence_sim.clock_parameters import ClockParameters
+from vergence_sim.joint_speeds import JointSpeeds
 from vergence_sim.parameters import SimParameters
 from vergence_sim.real_time import Event, Schedule
 from vergence_sim.ros.clock_server import START_NS, ClockServer
@@ -42,7 +43,7 @@ class RealTimeNode(Node):
     def __init__(self, name: str, groups: Groups, **options: Any) -> None:
         super().__init__(name, **options)
         self._settings = declare(self, groups)
-        self._diagnostics = Diagnostics(self)
+        self._diagnostics = Diagnostics(self, "simulated head")
         self._qos = qos = watch_qos(self, self._diagnostics)
         self._images = {eye: qos.create_publisher(Image, f"{eye}/image_raw", IMAGE_QOS) for eye in EYES}
         self._jpegs = {
@@ -55,6 +56,7 @@ class RealTimeNode(Node):
         self._settings.on_change(self._on_settings)
         self._actions: deque[tuple[float, Callable[[Any, float], None]]] = deque()
         self._published = dict.fromkeys(EYES, 0)
+        self._reported_speeds, self._true_speeds = JointSpeeds(), JointSpeeds()
         self._dropped = 0
         self._refused: list[str] = []
         self._stop = threading.Event()
@@ -207,9 +209,11 @@ class RealTimeNode(Node):
         world.advance_to(event.due_s)
         stamp = to_stamp(self._start_s + world.time_s)
         if event.kind == "joints":
-            self._joints.publish(joint_state(stamp, world.joint_states()))
+            reported, true = world.joint_states(), world.true_joints()
+            self._joints.publish(joint_state(stamp, reported, self._reported_speeds.at(world.time_s, reported)))
+            true_speeds = self._true_speeds.at(world.time_s, true)
             if self._true_joints.get_subscription_count():
-                self._true_joints.publish(joint_state(stamp, world.true_joints()))
+                self._true_joints.publish(joint_state(stamp, true, true_speeds))
             return
         header = Header(stamp=stamp, frame_id=f"{event.eye}_camera_optical_frame")
         picture = self._image_pool.submit(world.expose(event.eye))

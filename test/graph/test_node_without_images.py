@@ -1,5 +1,7 @@
 """A metric node without images says in its log what it waits for."""
 
+import socket
+
 import pytest
 from rcl_interfaces.msg import Log
 from sensor_msgs.msg import Image
@@ -23,6 +25,11 @@ def test_a_node_without_images_names_both_topics_and_who_publishes_them(graph: G
     text = graph.wait(said).msg
     assert "/left/image_raw and /right/image_raw: nothing publishes there" in text
     assert "camera_node" in text
+
+
+def test_the_diagnostics_of_a_node_without_hardware_name_its_computer(graph: Graph) -> None:
+    graph.start(EdgeMetricNode)
+    assert graph.diagnostic("edge_metric_node: pairs", lambda status: True).hardware_id == socket.gethostname()
 
 
 def test_a_publisher_that_sends_nothing_is_counted(graph: Graph) -> None:
