@@ -1,8 +1,10 @@
 """The one way in which every node starts, spins and ends."""
 
 import os
+import pwd
 import signal
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -28,6 +30,7 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
     that cannot be read. A clean end is status 0, also of a node that ends while it is being made.
     """
     keep_large_blocks()
+    _ensure_home()
     stop_asked = threading.Event()
     # Under rclpy's own handlers, which shut the context down, Python's would also raise KeyboardInterrupt in the middle
     # of whatever runs, a message's conversion or a servo's release.
@@ -63,6 +66,16 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
     finally:
         _close(node)
     return 0
+
+
+def _ensure_home() -> None:
+    """Give the logs of ROS a folder where HOME is not set, as in a service of the system."""
+    if any(os.environ.get(name) for name in ("HOME", "ROS_HOME", "ROS_LOG_DIR")):
+        return
+    try:
+        os.environ["HOME"] = pwd.getpwuid(os.getuid()).pw_dir
+    except KeyError:  # a user without an entry
+        os.environ["ROS_HOME"] = tempfile.gettempdir()
 
 
 def _bad_input(error: Exception) -> int:

@@ -60,8 +60,8 @@ def test_pigpio_connects_anew_after_a_lost_connection(daemon: PigpioDaemon):
     driver.close()
 
 
-def test_pigpio_names_the_service_where_there_is_no_daemon():
+def test_pigpio_names_the_page_where_there_is_no_daemon():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-    with pytest.raises(DriverUnavailableError, match="systemctl enable --now pigpiod"):
+    with pytest.raises(DriverUnavailableError, match=r"docs/servos\.md, 'pigpio'"):
         PigpioDriver(PigpioParameters(host="127.0.0.1", port=port))
