@@ -105,7 +105,9 @@ def _nodes() -> Iterable[Finding]:
         except ProcessError as error:
             absent.append(str(error))
     message = f"{len(NODES) - len(absent)} of {len(NODES)} are built" + "".join(f"; {text}" for text in absent)
-    yield Finding("nodes", not absent, message, build_hint())
+    # A Pi has only what the servos need.
+    needed = len(absent) == len(NODES) or not is_ros_workspace()
+    yield Finding("nodes", not absent, message, build_hint(), needed)
 
 
 def _middleware() -> Iterable[Finding]:
