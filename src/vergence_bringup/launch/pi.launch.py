@@ -18,8 +18,8 @@ from vergence_bringup.ros.launch_actions import described, head, node
 def build(values: Mapping[str, str]) -> list[Any]:
     own = {"rig": values["rig"], "servos": values["servos"], "start": values["start"]}
     own["backend"] = chosen_backend(values)
-    # After a crash the next start releases servos that were left driven.
     fakes = fakes_banner(values)
+    # After a crash the next start releases servos that were left driven.
     servo_node = node("servo_node", values["params_file"], respawn=True, parameters=own)
     return [
         *([LogInfo(msg=fakes)] if fakes else []),
