@@ -96,7 +96,7 @@ def test_ctrl_c_cancels_the_goal(graph: Graph) -> None:
     graph.wait_until(lambda: bool(controller.goals), "the goal arrives")
     process.send_signal(signal.SIGINT)
     code, _, err = ended(graph, process)
-    assert code == 130
+    assert code == 130, err
     assert "the goal is cancelled" in err
     assert "Traceback" not in err
     assert controller.cancelled.done()

@@ -3,6 +3,7 @@
 import argparse
 import signal
 import sys
+import threading
 import time
 from typing import Any
 
@@ -32,16 +33,19 @@ _CANCEL_S, _SLICE_S = 5.0, 0.1
 def run(options: argparse.Namespace) -> int:
     """Look; returns 0 if the eyes verged, 1 if not, 2 for bad input, 130 after Ctrl-C, which cancels the goal."""
     request = look_request(options)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    # Without rclpy's handlers: after Ctrl-C the goal is still to be cancelled.
+    stop_asked = threading.Event()
+    # Without rclpy's handlers, since after Ctrl-C the goal is still to be cancelled; and without an exception in the
+    # middle of whatever rclpy does then.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    look = Look(options.namespace)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop_asked.set())
+    look = Look(options.namespace, stop_asked)
     try:
         return look.at(request, options.time_limit, options.wait)
     except GraphError as error:
         print(f"vergence look: {error}", file=sys.stderr)
         return _NOT_VERGED
-    except KeyboardInterrupt:
+    except _InterruptedError:
         look.cancel()
         print("\nended: the goal is cancelled", file=sys.stderr)
         return _INTERRUPTED
@@ -49,10 +53,15 @@ def run(options: argparse.Namespace) -> int:
         look.close()
 
 
-class Look:
-    """A client of gaze/look_at, spun by the calling thread."""
+class _InterruptedError(Exception):
+    """Ctrl-C, or SIGTERM."""
 
-    def __init__(self, namespace: str) -> None:
+
+class Look:
+    """A client of gaze/look_at, spun by the calling thread until `stop_asked` is set."""
+
+    def __init__(self, namespace: str, stop_asked: threading.Event) -> None:
+        self._stop_asked = stop_asked
         self._node = Node("vergence_look", namespace=namespace or None)
         self._client = ActionClient(self._node, LookAt, "gaze/look_at")
         self._executor = SingleThreadedExecutor()
@@ -104,11 +113,16 @@ class Look:
                     f"nothing serves {name} after {wait_s:g} s: gaze_controller_node does, in sim.launch.py, "
                     "rig.launch.py or by itself (same ROS_DOMAIN_ID and namespace?)"
                 )
-            self._executor.spin_once(timeout_sec=_SLICE_S)
+            self._spin_once()
+
+    def _spin_once(self) -> None:
+        self._executor.spin_once(timeout_sec=_SLICE_S)
+        if self._stop_asked.is_set():
+            raise _InterruptedError
 
     def _spin_until(self, future: Any) -> Any:
         while not future.done():
-            self._executor.spin_once(timeout_sec=_SLICE_S)
+            self._spin_once()
             if not future.done() and not self._client.server_is_ready():
                 raise GraphError("gaze_controller_node has gone: the goal has no result")
         return future.result()
