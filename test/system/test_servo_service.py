@@ -2,10 +2,12 @@
 
 import configparser
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -40,16 +42,21 @@ def test_the_unit_needs_no_home(unit: configparser.RawConfigParser) -> None:
     assert unit["Service"]["Environment"] == f"ROS_HOME=/var/lib/{unit['Service']['StateDirectory']}"
 
 
-def test_systemd_accepts_the_unit(tmp_path: Path) -> None:
+def test_systemd_accepts_the_units(tmp_path: Path) -> None:
+    """The shipped one, and that of the page which switches a PCA9685's outputs on and off with it."""
     if shutil.which("systemd-analyze") is None:
         pytest.skip("systemd-analyze is not installed here")
-    copy = tmp_path / "vergence-servo@me.service"
-    # What is judged is the unit, not this machine's users and files.
-    text = UNIT.read_text().replace("User=%i", "User=root").replace("/bin/bash ${WORKSPACE}", "/bin/true ${WORKSPACE}")
-    copy.write_text(text)
-    ran = subprocess.run(["systemd-analyze", "verify", str(copy)], capture_output=True, text=True, timeout=TIMEOUT_S)
-    complaints = [line for line in ran.stderr.splitlines() if copy.name in line]
-    assert complaints == []
+    page = (ROOT / "docs" / "servos.md").read_text(encoding="utf-8")
+    (outputs,) = re.findall(r"```ini\n(.*?)```", page, flags=re.DOTALL)
+    # What is judged is the units, not this machine's users and files.
+    servo = UNIT.read_text().replace("User=%i", "User=root").replace("/bin/bash ${WORKSPACE}", "/bin/true ${WORKSPACE}")
+    units = {"vergence-servo@me.service": servo, "vergence-oe.service": textwrap.dedent(outputs)}
+    for name, text in units.items():
+        (tmp_path / name).write_text(text)
+    command = ["systemd-analyze", "verify", *(str(tmp_path / name) for name in units)]
+    environment = os.environ | {"SYSTEMD_UNIT_PATH": f"{tmp_path}:"}
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, env=environment)
+    assert [line for line in ran.stderr.splitlines() if any(name in line for name in units)] == []
 
 
 @pytest.fixture
