@@ -1,7 +1,10 @@
 """The one way in which every node starts, spins and ends."""
 
+import os
+import pwd
 import signal
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,14 +18,19 @@ from vergence_common.memory import keep_large_blocks
 STATUS_BAD_INPUT = 2
 
 
+class StartAbandonedError(Exception):
+    """Raised while a node is made and asked to end, by one whose own thread cannot stop what it is doing at once."""
+
+
 def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -> int:
     """Make a node, spin it on one thread until SIGINT, SIGTERM or shutdown, close it, and return the exit status.
 
     The node's own `close()`, where it has one, releases hardware and joins its threads. A ValueError while the node
     is made (a wrong parameter, rig or calibration) is one line on standard error and status 2; so is a parameter file
-    that cannot be read. A clean end is status 0.
+    that cannot be read. A clean end is status 0, also of a node that ends while it is being made.
     """
     keep_large_blocks()
+    _ensure_home()
     stop_asked = threading.Event()
     # Under rclpy's own handlers, which shut the context down, Python's would also raise KeyboardInterrupt in the middle
     # of whatever runs, a message's conversion or a servo's release.
@@ -41,6 +49,12 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
         node = make_node()
         executor.add_node(node)
         executor.spin()
+    except StartAbandonedError:
+        # Its thread holds no hardware; waiting for it, or tearing the interpreter down beside it, would be wrong.
+        rclpy.try_shutdown()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
     except ExternalShutdownException:
         pass
     except Exception as error:
@@ -52,6 +66,16 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
     finally:
         _close(node)
     return 0
+
+
+def _ensure_home() -> None:
+    """Give the logs of ROS a folder where HOME is not set, as in a service of the system."""
+    if any(os.environ.get(name) for name in ("HOME", "ROS_HOME", "ROS_LOG_DIR")):
+        return
+    try:
+        os.environ["HOME"] = pwd.getpwuid(os.getuid()).pw_dir
+    except KeyError:  # a user without an entry
+        os.environ["ROS_HOME"] = tempfile.gettempdir()
 
 
 def _bad_input(error: Exception) -> int:

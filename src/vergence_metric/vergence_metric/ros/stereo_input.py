@@ -14,6 +14,7 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
+from vergence_common.awaited import report_awaited
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.images import ImageError, compressed_to_array, image_to_array
 from vergence_common.qos import IMAGE_QOS, QosWatch
@@ -25,6 +26,9 @@ from vergence_metric.pairs.stream_health import StreamHealth
 from vergence_rig.camera import CameraModel, CameraModelError
 
 SIDES = ("left", "right")
+_SOURCES = (
+    "Images come from camera_node (rig.launch.py), sim_node (sim.launch.py), photo_node or another camera's driver"
+)
 
 # camera_info is small and repeated with every image; best effort is compatible with every publisher.
 _INFO_QOS = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
@@ -93,6 +97,7 @@ class StereoInput:
             diagnostics.add(f"{name} images", lambda side=side: self._stream_report(side))  # type: ignore[misc]
         diagnostics.add("pairs", self._pairs_report)
         diagnostics.add("cameras", self._cameras_report)
+        report_awaited(node, lambda: [health.topic for health in self._health if not health.received], _SOURCES)
 
     def set_parameters(self, stereo: StereoParameters, pairing: PairingParameters) -> None:
         """Use these from the next image on; the transport stays as it is."""
