@@ -36,7 +36,7 @@ _FURTHEST_PX, _VAGUE_PX = 0.75, 0.12  # a fit further from the plane of its surf
 _LEAST_DEVIATIONS = -1.0  # below what chance gives, for the strip's smoothness speaks for a point too
 _SURE_DEVIATIONS = 0.5  # but a strip looks smooth whatever it shows: sure is only what does better than chance
 _LEAST_DEVIATIONS_FLAT = 1.0  # where only one window has texture: a wall's shading is smooth, and matches anywhere
-_LEAST_CONFIDENCE = 0.2
+_LEAST_CONFIDENCE = 0.3
 _UNSURE = 0.5  # confidence of what is more likely wrong than right, at most
 _MOST_REPEATED = 4
 

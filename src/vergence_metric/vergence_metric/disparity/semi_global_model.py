@@ -9,10 +9,10 @@ from dataclasses import astuple, dataclass
 CHOICE = (-2.60, -0.65, 1.14, 3.83, 0.24, 3.15)
 """Conditional logit of a candidate against none: bias, then the weights of `Support` in its order."""
 
-CONFIDENCE = (-5.85, 0.85, 1.37, 0.01, 0.93, 1.85, -0.48, -0.55)
+CONFIDENCE = (-6.64, 0.93, 1.61, 0.05, 0.84, 2.00, -0.54, -0.56)
 """Logistic model of an error of at most 2 px: bias, then the weights of `Evidence.terms`."""
 
-SIGMA = (1.04, 0.71, 0.39)
+SIGMA = (1.03, 0.68, 0.41)
 """Log-linear quantile of the error that two deviations hold, halved: bias, then the weights of `Evidence.scales`."""
 
 _BACK_PX = 2.0
