@@ -256,8 +256,7 @@ def pursuit_error_deg(rig: Rig, true_latency_s: float) -> float:
             controller.look_at(Goal(GoalKind.PIXEL, left_xy=(x, y)), head.time_s)
         command = controller.step(head.time_s, arrived)
         arrived = []
-        if command.joints_rad is not None:
-            head.command(command.joints_rad)
+        head.execute(command)
         errors.append(abs(math.degrees(head.true_errors_rad()[0])))
     return float(np.median(errors[-60:]))
 
