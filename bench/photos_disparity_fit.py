@@ -218,7 +218,7 @@ def main() -> None:
 def _likeliest(supports: Matrix, choice: Matrix) -> int:
     """Return the index of the candidate that the estimator would measure with this model."""
     scores = choice[0] + supports @ choice[1:]
-    own = np.where((supports[:, 1] > 0.0) & (scores > 0.0), scores, -np.inf)
+    own = np.where((supports[:, 0] > 0.0) & (scores > 0.0), scores, -np.inf)
     return int((own if np.isfinite(own).any() else scores).argmax())
 
 

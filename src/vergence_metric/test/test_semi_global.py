@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vergence_metric.disparity import DisparityStatus, make_estimator
-from vergence_metric.disparity.candidates import profiles, repetitions, vertical_px
+from vergence_metric.disparity.candidates import column, profiles, repetitions, vertical_px
 from vergence_metric.disparity.lighting import lit_alike
 from vergence_metric.disparity.own_surface import own_surface
 from vergence_metric.disparity.parameters import DisparityParameters
@@ -233,7 +233,6 @@ def test_the_right_image_is_lit_as_the_left_one_in_the_rows_that_are_matched(pla
 EVIDENCE = Evidence(
     score=2.0,
     back_px=0.1,
-    spread_px=1.0,
     own_share=0.9,
     fit_sigma_px=0.05,
     fit_correlation=0.99,
@@ -247,7 +246,6 @@ EVIDENCE = Evidence(
         {"score": -1.0},
         {"back_px": 9.0},
         {"back_px": math.nan},
-        {"spread_px": 30.0},
         {"own_share": 0.2},
         {"fit_correlation": 0.3},
         {"off_plane_px": 0.8},
@@ -268,10 +266,35 @@ def test_the_deviation_grows_with_the_fits_and_with_its_distance_from_the_surfac
 
 
 def test_more_support_makes_a_candidate_likelier():
-    support = Support(correlation=0.5, agrees=0.0, near_share=0.2, wide_share=0.1)
+    support = Support(agrees=0.0, near_share=0.2, column=0.3)
     for name in support.__dict__:
         assert choice_score(Support(**(support.__dict__ | {name: 0.9}))) > choice_score(support)
-    assert len(CHOICE) == 5
+    assert len(CHOICE) == 1 + len(support.__dict__)
+
+
+def rod(width_px, near_px, far_px, seed):
+    """See an upright rod with bands along it, alike across, before a textured background."""
+    left, right = view(texture(20 + seed), noise_seed=1), view(texture(20 + seed), far_px, noise_seed=2)
+    bands = cv2.GaussianBlur(np.random.default_rng(seed).normal(0.0, 1.0, (HEIGHT, 1)), (0, 0), 2.0)
+    grey = np.clip(90.0 + 40.0 * bands / bands.std(), 0, 255).astype(np.uint8)
+    first = round(POINT[0]) - width_px // 2
+    left[:, first : first + width_px] = grey
+    right[:, first - near_px : first - near_px + width_px] = grey
+    return left, right
+
+
+@pytest.mark.parametrize(("width_px", "most_wrong"), [(7, 2), (9, 0)])
+def test_a_thin_rod_is_matched_by_its_own_pixels(width_px, most_wrong):
+    answers = [estimate(*rod(width_px, 40, 0, seed)) for seed in range(6)]
+    wrong = [answer for answer in answers if not (answer.ok and abs(answer.horizontal_px - 40.0) <= 2.0)]
+    assert len(wrong) <= most_wrong
+
+
+def test_the_tall_window_sees_the_rod_where_square_ones_see_the_background():
+    pair = pair_about(*rod(5, 40, 0, 3), POINT, PARAMETERS)
+    tall, square = column(pair, 0, (-100, 100), PARAMETERS), profiles(pair, PARAMETERS)[2]
+    assert tall.at(40.0) > 0.8 > tall.at(0.0)
+    assert square.at(0.0) > square.at(40.0)
 
 
 def test_own_pixels_decide_where_they_fit_and_match_back():

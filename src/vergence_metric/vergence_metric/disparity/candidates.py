@@ -20,7 +20,9 @@ _REPEATS = 0.93  # self-correlation of a repeated texture without noise
 _CLEAR = 3.0  # signal over noise from which a window can tell a repetition
 _WIDER = (2.0, 4.0)  # times the largest window
 _MOST_DEVIATIONS = 12.0
-_COLUMN_PX, _COLUMN_ROWS_PX = (2.5, 12.0), 2  # deviations of the tall window across and down, rows searched either way
+_COLUMN_ROWS_PX = 2  # rows searched on either side of the vertical disparity
+COLUMN_PX = (2.5, 12.0)
+"""Standard deviations of the tall window, across and down."""
 _UNEXPLAINED = 0.1  # share of the variance that half resolution may leave unexplained of an exact repetition
 _VERTICAL_COST = 0.05  # per pixel, in logarithms of what is unexplained: rows are roughly aligned
 
@@ -92,12 +94,12 @@ def column(pair: FoveaPair, vertical_px: int, span_px: tuple[int, int], paramete
     """
     at = (round(pair.point_px[0]), round(pair.point_px[1]))
     rows = (vertical_px - _COLUMN_ROWS_PX, vertical_px + _COLUMN_ROWS_PX)
-    surface = correlate(*pair.full, at, _COLUMN_PX[0], span_px, rows, down=_COLUMN_PX[1])
+    surface = correlate(*pair.full, at, COLUMN_PX[0], span_px, rows, down=COLUMN_PX[1])
     x = pair.point_px[0] - (surface.first_d + np.arange(surface.zncc.shape[1]))
     visible = (x >= 0) & (x <= pair.left.shape[1] - 1)
     values = np.where(visible, surface.profile, -1.0).astype(np.float32)
     textured = surface.texture.signal >= parameters.min_texture
-    return Profile(_COLUMN_PX[0], 1, surface.first_d, values, textured, surface)
+    return Profile(COLUMN_PX[0], 1, surface.first_d, values, textured, surface)
 
 
 def vertical_px(layers: Sequence[Profile]) -> int:

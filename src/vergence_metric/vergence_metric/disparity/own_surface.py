@@ -21,16 +21,12 @@ _STEEPEST = 0.3
 
 @dataclass(frozen=True)
 class OwnSurface:
-    """The surface at a point: disparity [px], its slopes across and down, and which pixels lie on it (1, else 0).
-
-    `spread_px` is the range of the disparities about the point, whatever they belong to.
-    """
+    """The surface at a point: disparity [px], its slopes across and down, and which pixels lie on it (1, else 0)."""
 
     disparity_px: float
     slope_x: float
     slope_y: float
     support: Strip
-    spread_px: float
 
     def share(self, half_px: int) -> float:
         """Return the share of the pixels in the square about the point that lie on the surface."""
@@ -63,9 +59,7 @@ def own_surface(patch: DisparityPatch, at: tuple[int, int], d: float, radius: in
     weights = np.zeros((2 * radius + 1, 2 * radius + 1), np.float32)
     top, first = patch.y0 - at[1] + radius, patch.x0 - at[0] + radius
     weights[top : top + h, first : first + w] = fits
-    near = patch.about(*at, _NEAR_PX)
-    spread_px = float(near.max() - near.min()) if near.size else 0.0
-    return OwnSurface(*plane, Strip(weights, at[0] - radius, at[1] - radius), spread_px)
+    return OwnSurface(*plane, Strip(weights, at[0] - radius, at[1] - radius))
 
 
 def _plane(

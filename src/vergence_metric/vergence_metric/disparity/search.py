@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.disparity.candidates import COLUMN_PX
 from vergence_metric.disparity.correlation import Surface, correlate, radius_of, texture_about
 from vergence_metric.disparity.evidence import Evidence
 from vergence_metric.disparity.fovea_pair import FoveaPair, Strip
@@ -48,7 +49,7 @@ class Match:
 
 def pair_about(left: Image, right: Image, point_px: tuple[float, float], parameters: DisparityParameters) -> FoveaPair:
     """Return the crops that a search about this point needs."""
-    margin = radius_of(max(parameters.windows_px)) + 4
+    margin = radius_of(max(*parameters.windows_px, COLUMN_PX[1])) + 4
     reach = parameters.max_px + max(_VICINITY_PX, parameters.track_px)
     return FoveaPair(left, right, point_px, reach, parameters.max_vertical_px + 4, margin)
 

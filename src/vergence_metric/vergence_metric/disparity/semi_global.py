@@ -28,7 +28,7 @@ _PEAKS = 2  # of each window's correlation are candidates
 _MARGIN_PX = 4
 _SURROUNDINGS_PX = 28  # half side of the square whose disparities are searched at full resolution
 _OUTLIERS = 0.03  # share of those disparities that may be wrong, at either end
-_NEAR_PX, _WIDE_PX = 4, 20  # half sides of the squares in which support is counted
+_NEAR_PX = 4  # half side of the square in which support is counted
 _OWN_PX = 8  # half side of the square in which the point's surface is counted
 _BESIDE_SHARE = 0.1  # of the pixels about the point that make another surface a candidate
 _BACK_MARGIN_PX = 8
@@ -135,7 +135,6 @@ class PointMatching:
         evidence = Evidence(
             score=choice.score,
             back_px=abs(self._matched_back(choice.disparity_px) - choice.disparity_px),
-            spread_px=own.spread_px,
             own_share=own.share(_OWN_PX),
             fit_sigma_px=fit.sigma_px if fit else math.nan,
             fit_correlation=fit.correlation if fit else 0.0,
@@ -186,12 +185,12 @@ class PointMatching:
                 named += [(float(d), f"window of {layer.window_px:g} px") for d in layer.peaks[:_PEAKS]]
         if self._column.textured:
             named += [(float(d), "tall window") for d in self._column.peaks[:_PEAKS]]
-        about = self._fine.about(*self._at, _NEAR_PX), self._fine.about(*self._at, _WIDE_PX)
+        near = self._fine.about(*self._at, _NEAR_PX)
         found: list[Choice] = []
         for d, name in named:
             inside = math.isfinite(d) and abs(d) <= self._parameters.max_px
             if inside and all(abs(d - one.disparity_px) > _SAME_PX for one in found):
-                support = self._support(d, *about)
+                support = self._support(d, near)
                 found.append(Choice(d, name, support, choice_score(support)))
         return found
 
@@ -201,15 +200,12 @@ class PointMatching:
         others = near[np.abs(near - own) > 2.0 * _SAME_PX]
         return float(np.median(others)) if others.size > _BESIDE_SHARE * near.size else math.nan
 
-    def _support(self, d: float, near: NDArray[np.float32], wide: NDArray[np.float32]) -> Support:
-        correlations = [max(layer.at(d), 0.0) for layer in self._layers if layer.textured]
-        correlation = sum(correlations) / len(correlations)
+    def _support(self, d: float, near: NDArray[np.float32]) -> Support:
+        correlated = [self._column] if self._column.textured else [one for one in self._layers if one.textured]
         return Support(
-            correlation=correlation,
             agrees=float(abs(self._fine.at(*self._at) - d) <= _SAME_PX),
-            near_share=_share(near, d),
-            wide_share=_share(wide, d),
-            column=max(self._column.at(d), 0.0) if self._column.textured else correlation,
+            near_share=float((np.abs(near - d) <= _SAME_PX).mean()) if near.size else 0.0,
+            column=sum(max(one.at(d), 0.0) for one in correlated) / len(correlated),
         )
 
     def _matched_back(self, d: float) -> float:
@@ -251,7 +247,3 @@ class PointMatching:
         total = 1.0 + sum(odds)
         ranked = [Candidate(c.disparity_px, o / total, c.found_by) for c, o in zip(choices, odds, strict=True)]
         return tuple(sorted(ranked, key=lambda one: -one.likelihood))
-
-
-def _share(disparities: NDArray[np.float32], d: float) -> float:
-    return float((np.abs(disparities - d) <= _SAME_PX).mean()) if disparities.size else 0.0

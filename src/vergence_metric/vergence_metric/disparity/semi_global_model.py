@@ -6,10 +6,10 @@
 import math
 from dataclasses import astuple, dataclass
 
-CHOICE = (-2.60, -0.65, 1.14, 3.83, 0.24, 3.15)
+CHOICE = (-2.81, 1.16, 3.84, 2.94)
 """Conditional logit of a candidate against none: bias, then the weights of `Support` in its order."""
 
-CONFIDENCE = (-6.64, 0.93, 1.61, 0.05, 0.84, 2.00, -0.54, -0.56)
+CONFIDENCE = (-6.39, 0.93, 1.61, 0.74, 1.95, -0.57, -0.55)
 """Logistic model of an error of at most 2 px: bias, then the weights of `Evidence.terms`."""
 
 SIGMA = (1.03, 0.68, 0.41)
@@ -18,7 +18,6 @@ SIGMA = (1.03, 0.68, 0.41)
 _BACK_PX = 2.0
 _LEAST_OWN_CORRELATION, _LARGEST_OWN_SIGMA_PX, _LEAST_OWN_SHARE = 0.95, 0.1, 0.2
 _WITHOUT_FIT_PX = 0.5  # stands for the deviation of the fit, and its distance from the plane, where nothing was fitted
-_SPREAD_PX = 0.5
 _FINEST_PX = 0.003
 _OFF_PLANE_PX = 0.1
 
@@ -27,15 +26,12 @@ _OFF_PLANE_PX = 0.1
 class Support:
     """What speaks for a candidate before it is measured, from 0 to 1 each.
 
-    `correlation` is the mean over the windows with texture; the others say whether the strip's matching gives the
-    point this disparity, and to which share of the pixels near and around it; `column` is the tall window's
-    correlation, that of the others where it has no texture.
+    `agrees` says whether the strip's matching gives the point this disparity, `near_share` to which share of the pixels
+    about it; `column` is the tall window's correlation, the mean of the others' where that has no texture.
     """
 
-    correlation: float
     agrees: float
     near_share: float
-    wide_share: float
     column: float
 
 
@@ -43,15 +39,13 @@ class Support:
 class Evidence:
     """What speaks for the candidate that was measured.
 
-    `score` is its log odds against none, `back_px` how far matching back from the right image misses it, `spread_px`
-    the range of the strip's disparities about the point, `own_share` the share of the pixels about the point that lie
-    on its surface. `fit_sigma_px` is the standard deviation of its affine fit, `fit_correlation` the correlation there
+    `score` is its log odds against none, `back_px` how far matching back from the right image misses it,
+    `own_share` the share of the pixels about the point that lie on its surface. `fit_sigma_px` is the standard deviation of its affine fit, `fit_correlation` the correlation there
     and `off_plane_px` how far it lies from the plane of the surface; NaN, 0 and NaN where the fit did not converge.
     """
 
     score: float
     back_px: float
-    spread_px: float
     own_share: float
     fit_sigma_px: float
     fit_correlation: float
@@ -71,7 +65,6 @@ class Evidence:
         return (
             self.score,
             returns,
-            math.log(self.spread_px + _SPREAD_PX),
             self.own_share,
             self.fit_correlation,
             off,
