@@ -39,9 +39,10 @@ class Support:
 class Evidence:
     """What speaks for the candidate that was measured.
 
-    `score` is its log odds against none, `back_px` how far matching back from the right image misses it,
-    `own_share` the share of the pixels about the point that lie on its surface. `fit_sigma_px` is the standard deviation of its affine fit, `fit_correlation` the correlation there
-    and `off_plane_px` how far it lies from the plane of the surface; NaN, 0 and NaN where the fit did not converge.
+    `score` is its log odds against none, `back_px` how far matching back from the right image misses it and `own_share`
+    the share of the pixels about the point that lie on its surface. `fit_sigma_px` is the standard deviation of its
+    affine fit, `fit_correlation` the correlation there and `off_plane_px` how far it lies from the plane of the
+    surface; NaN, 0 and NaN where the fit did not converge.
     """
 
     score: float
