@@ -10,6 +10,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
+from vergence_common.blas_threads import limit_blas_threads
 from vergence_common.memory import keep_large_blocks
 
 STATUS_BAD_INPUT = 2
@@ -23,6 +24,7 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
     that cannot be read. A clean end is status 0.
     """
     keep_large_blocks()
+    limit_blas_threads()
     stop_asked = threading.Event()
     # Under rclpy's own handlers, which shut the context down, Python's would also raise KeyboardInterrupt in the middle
     # of whatever runs, a message's conversion or a servo's release.

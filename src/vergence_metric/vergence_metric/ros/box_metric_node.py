@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import cv2
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
@@ -35,7 +34,7 @@ from vergence_metric.ros.box_messages import (
     vision_type,
 )
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.stereo_node import StereoNode
+from vergence_metric.ros.stereo_node import StereoNode, limit_threads
 from vergence_msgs.msg import BoxVergence, StereoDetections
 from vergence_rig.rig import load_rig
 
@@ -49,7 +48,7 @@ class BoxMetricNode(StereoNode):
         super().__init__("box_metric_node", **options)
         self._settings = declare(self, GROUPS)
         settings: BoxMetricNodeParameters = self._settings.value
-        cv2.setNumThreads(settings.threads or -1)
+        limit_threads(settings.threads)
         rig = load_rig(settings.rig)
         self._metric_parameters = _parameters_of(self._settings)
         self._measurement = BoxMeasurement(self._metric_parameters, rig.baseline_m, threads=settings.threads)
@@ -85,7 +84,7 @@ class BoxMetricNode(StereoNode):
         return SetParametersResult(successful=True)
 
     def _on_settings(self, settings: ParameterSet) -> None:
-        cv2.setNumThreads(settings.value.threads or -1)
+        limit_threads(settings.value.threads)
         self._metric_parameters = _parameters_of(settings)
         self._stereo.set_parameters(settings.value, settings.get(PairingParameters))
 

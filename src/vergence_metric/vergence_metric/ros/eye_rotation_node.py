@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import cv2
 from sensor_msgs.msg import JointState
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
@@ -26,7 +25,7 @@ from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters
 from vergence_metric.ros.eye_rotation_messages import eye_rotation_message
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.stereo_node import StereoNode
+from vergence_metric.ros.stereo_node import StereoNode, limit_threads
 from vergence_msgs.msg import EyeRotation
 from vergence_rig.rig import load_rig
 
@@ -38,7 +37,7 @@ class EyeRotationNode(StereoNode):
         super().__init__("eye_rotation_node", **options)
         self._settings = declare(self, GROUPS)
         root = self._settings.get(EyeRotationNodeParameters)
-        cv2.setNumThreads(root.threads or -1)
+        limit_threads(root.threads)
         self._rig = load_rig(root.rig)
         self._encoder = VisualEncoder(_encoder_parameters(self._settings), self._rig)
         self._selection: PairSelection[ImagePair] = PairSelection(root.rate_hz)
@@ -58,7 +57,7 @@ class EyeRotationNode(StereoNode):
 
     def _on_settings(self, settings: ParameterSet) -> None:
         root = settings.get(EyeRotationNodeParameters)
-        cv2.setNumThreads(root.threads or -1)
+        limit_threads(root.threads)
         self._encoder = VisualEncoder(_encoder_parameters(settings), self._rig)
         self._selection.rate_hz = root.rate_hz
         self._stereo.set_parameters(root, settings.get(PairingParameters))

@@ -1,15 +1,24 @@
 """Base of the nodes that measure pairs of images: joint history, stage times, and the report of a failed pair."""
 
+import os
 import traceback
 from typing import Any
 
+import cv2
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from vergence_common.blas_threads import limit_blas_threads
 from vergence_common.stamps import to_nanoseconds
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.stage_times import StageTimes
 from vergence_rig.joint_history import JointHistory
+
+
+def limit_threads(count: int) -> None:
+    """Let OpenCV and BLAS use at most `count` threads for one operation; 0 is one for each core."""
+    cv2.setNumThreads(count or -1)
+    limit_blas_threads(count or os.cpu_count() or 1)
 
 
 class StereoNode(Node):
