@@ -9,6 +9,7 @@ import numpy as np
 from bench.cost_photographs import Glance, glances, models
 from bench.photos_data import NoPhotographsError
 from bench.results import Row
+from vergence_common.memory import keep_large_blocks
 from vergence_metric.disparity.angular_disparity import angular_disparity
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import PairMeasurementParameters
@@ -28,6 +29,7 @@ def run(say: Callable[[str], None]) -> list[Row]:
     except NoPhotographsError as error:
         say(f"skipped: {error}")
         return []
+    keep_large_blocks()  # as every node does
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:

@@ -60,7 +60,8 @@ class GazeControllerNode(Node):
 
         diagnostics = Diagnostics(self)
         diagnostics.add("gaze", self._report)
-        watch = watch_qos(self, diagnostics)
+        self._reads_edges = False
+        self._watch = watch = watch_qos(self, diagnostics)
         self._command = watch.create_publisher(JointState, "joint_command")
         self._track_requests = watch.create_publisher(TrackRequest, "vergence/track_request")
         self._state = watch.create_publisher(GazeState, "gaze/state")
@@ -72,10 +73,7 @@ class GazeControllerNode(Node):
         watch.create_subscription(
             JointState, "servo_node/resolution", lambda m: self._add(convert.joint_resolution(m)), latched
         )
-        watch.create_subscription(EdgeVergence, "vergence/edge", lambda m: self._add(convert.edge_contrast(m)))
-        watch.create_subscription(
-            VergenceError, "vergence/error", lambda m: self._add(convert.fovea_disparity(m, self._left.fx_px))
-        )
+        watch.create_subscription(VergenceError, "vergence/error", self._on_error)
         watch.create_subscription(
             TargetTrack, "vergence/track", lambda m: self._add(convert.track_sighting(m, self._left))
         )
@@ -100,6 +98,18 @@ class GazeControllerNode(Node):
 
     def _add(self, observation: Observation) -> None:
         self._arrived.append(observation)
+
+    def _on_error(self, message: VergenceError) -> None:
+        if message.contrast_window_px:
+            self._add(convert.error_contrast(message))
+        elif not self._reads_edges:
+            # Another metric's error says nothing of contrast: vergence/edge does, and costs both sides more.
+            self._reads_edges = True
+            self._watch.create_subscription(EdgeVergence, "vergence/edge", self._on_edge)
+        self._add(convert.fovea_disparity(message, self._left.fx_px))
+
+    def _on_edge(self, message: EdgeVergence) -> None:
+        self._add(convert.edge_contrast(message))
 
     def _on_target(self, message: PointStamped) -> None:
         stamp_s = to_seconds(message.header.stamp) or self._now_s()

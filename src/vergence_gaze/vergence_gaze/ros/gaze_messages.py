@@ -122,6 +122,11 @@ def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
     )
 
 
+def error_contrast(message: VergenceError) -> EdgeContrast:
+    """Return the least contrast of the small windows, which comes with the signed error."""
+    return EdgeContrast(to_seconds(message.header.stamp), message.contrast, math.nan)
+
+
 def edge_contrast(message: EdgeVergence) -> EdgeContrast:
     """Return the least contrast of the small windows, which show vergence best, and the raw metric of that window."""
     best = (math.nan, math.nan)

@@ -8,6 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from vergence_metric.disparity import Disparity, make_estimator
+from vergence_metric.disparity.shared_estimate import SharedEstimate
 from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
@@ -43,7 +44,7 @@ class PairMeasurement:
         self._parameters = p = parameters
         self._metric = EdgeMetric(p.edges, p.contrast, p.alignment)
         self._classifier = FovealVergenceClassifier(p.verged)
-        self._estimator = make_estimator(p.disparity)
+        self._estimator = SharedEstimate(make_estimator(p.disparity), p.disparity)
 
     @property
     def parameters(self) -> PairMeasurementParameters:
@@ -59,7 +60,7 @@ class PairMeasurement:
         if p.verged != before.verged:
             self._classifier = FovealVergenceClassifier(p.verged)
         if p.disparity != before.disparity:
-            self._estimator = make_estimator(p.disparity)
+            self._estimator = SharedEstimate(make_estimator(p.disparity), p.disparity)
             self._tracker = None
         if p.tracker != before.tracker:
             self._tracker = None

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from time import monotonic_ns
 from typing import Any
 
-import cv2
 from sensor_msgs.msg import Image, JointState
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
@@ -24,7 +23,7 @@ from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.ros.edge_messages import edge_message, error_message
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.stereo_node import StereoNode
+from vergence_metric.ros.stereo_node import StereoNode, limit_threads
 from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
@@ -40,7 +39,7 @@ class EdgeMetricNode(StereoNode):
         super().__init__("edge_metric_node", **options)
         self._settings = declare(self, GROUPS)
         stereo = self._settings.get(StereoParameters)
-        cv2.setNumThreads(stereo.threads or -1)
+        limit_threads(stereo.threads)
         self._measurement = PairMeasurement(_measurement_parameters(self._settings), load_rig(stereo.rig))
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
@@ -58,7 +57,7 @@ class EdgeMetricNode(StereoNode):
 
     def _on_settings(self, settings: ParameterSet) -> None:
         stereo = settings.get(StereoParameters)
-        cv2.setNumThreads(stereo.threads or -1)
+        limit_threads(stereo.threads)
         self._stereo.set_parameters(stereo, settings.get(PairingParameters))
 
     def _on_request(self, message: TrackRequest) -> None:
@@ -76,10 +75,12 @@ class EdgeMetricNode(StereoNode):
             *models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px
         )
         with self._times.measure("publish"):
-            error = error_message(disparity, angular, header, skew_s)
-            verged = self._measurement.verged(edge, error.horizontal_px, error.confidence)
-            self._edge_publisher.publish(edge_message(edge, verged, header, skew_s))
+            error = error_message(disparity, angular, edge.least_contrast, header, skew_s)
+            error.verged = self._measurement.verged(edge, error.horizontal_px, error.confidence)
             self._error_publisher.publish(error)
+            if self._edge_publisher.get_subscription_count():
+                # Its arrays are measured only now.
+                self._edge_publisher.publish(edge_message(edge, error.verged, header, skew_s))
         self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
         self._times.add_all(edge.stage_s)
         self._publish_track(pair, edge, models)
