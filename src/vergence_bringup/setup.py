@@ -24,6 +24,7 @@ setup(
     entry_points={
         "console_scripts": [
             "vergence = vergence_bringup.command_line:main",
+            "head_node = vergence_bringup.ros.head_node:main",
         ]
     },
 )

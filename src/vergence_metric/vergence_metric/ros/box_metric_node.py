@@ -69,7 +69,7 @@ class BoxMetricNode(StereoNode):
             self._measure, self._on_failure, "measure", settings.niceness
         )
         pairing = self._settings.get(PairingParameters)
-        self._stereo = StereoInput(self, settings, pairing, diagnostics, qos, self._on_pair)
+        self._stereo = StereoInput(self, settings, pairing, diagnostics, qos, self._on_pair, images=self._images)
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self.add_on_set_parameters_callback(self._refuse_unknown_classes)
         self._settings.on_change(self._on_settings)

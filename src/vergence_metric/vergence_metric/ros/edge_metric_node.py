@@ -49,7 +49,7 @@ class EdgeMetricNode(StereoNode):
         self._overlay_publisher = qos.create_publisher(Image, "vergence/overlay", IMAGE_QOS)
         self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
         pairing = self._settings.get(PairingParameters)
-        self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit)
+        self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit, images=self._images)
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self._request_subscription = qos.create_subscription(TrackRequest, "vergence/track_request", self._on_request)
         self._settings.on_change(self._on_settings)

@@ -50,7 +50,9 @@ class EyeRotationNode(StereoNode):
             self._measure, self._on_failure, "encoder"
         )
         pairing = self._settings.get(PairingParameters)
-        self._stereo = StereoInput(self, root, pairing, diagnostics, qos, self._on_pair, self._selection.is_due)
+        self._stereo = StereoInput(
+            self, root, pairing, diagnostics, qos, self._on_pair, self._selection.is_due, self._images
+        )
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self._settings.on_change(self._on_settings)
         diagnostics.add("encoder", self._report)

@@ -9,6 +9,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from vergence_common.blas_threads import limit_blas_threads
+from vergence_common.local_images import LocalImages
 from vergence_common.stamps import to_nanoseconds
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.stage_times import StageTimes
@@ -26,8 +27,9 @@ class StereoNode(Node):
 
     _worker: LatestWorker[Any]
 
-    def __init__(self, name: str, **options: Any) -> None:
+    def __init__(self, name: str, images: LocalImages | None = None, **options: Any) -> None:
         super().__init__(name, **options)
+        self._images = images
         self._joints = JointHistory()
         self._times = StageTimes()
         self._failure: str | None = None
