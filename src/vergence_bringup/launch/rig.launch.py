@@ -2,7 +2,7 @@
 
 ros2 launch vergence_bringup rig.launch.py left_device:=/dev/v4l/by-id/... right_device:=/dev/v4l/by-id/...
 With the servos on another machine use laptop.launch.py there and pi.launch.py here, or servos:=false. detector:=true
-model:=/path/to/your.onnx adds metric II.
+model:=/path/to/your.onnx adds metric II. composed:=true runs all nodes in one process.
 """
 
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, GroupAction, SetEnvironmentVariable
-from launch.conditions import IfCondition
+from launch.conditions import IfCondition, UnlessCondition
 from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node, PushRosNamespace
 from launch_ros.parameter_descriptions import ParameterValue
@@ -67,6 +67,60 @@ def generate_launch_description() -> LaunchDescription:
             condition=IfCondition(LaunchConfiguration(condition)) if condition else None,
         )
 
+    def own(name: str, executable: str, **values: Any) -> list[Any]:
+        """Return the arguments of head_node that give one of its nodes the settings it has as a process of its own."""
+        arguments: list[Any] = []
+        for file in settings(executable):
+            arguments += ["--params", [f"{name}=", file]]
+        for parameter, value in values.items():
+            # Quoted: otherwise 0 would be a number and off false.
+            arguments += ["--set", [f"{name}:{parameter}:='", *(value if isinstance(value, list) else [value]), "'"]]
+        return arguments
+
+    def composed_camera(eye: str, lock: str, partner: Any = "") -> list[Any]:
+        locked = PythonExpression([f"'{lock}' if '", LaunchConfiguration("lock"), "' == 'true' else 'off'"])
+        return own(
+            f"{eye}_camera",
+            "camera_node",
+            rig=rig,
+            device=LaunchConfiguration(f"{eye}_device"),
+            camera_info_url=LaunchConfiguration(f"{eye}_camera_info_url"),
+            frame_id=f"{eye}_camera_optical_frame",
+            lock=locked,
+            partner=partner,
+        )
+
+    composed = LaunchConfiguration("composed")
+    chosen = [
+        "'left_camera,right_camera,edge_metric_node,gaze_controller_node'",
+        *(
+            part
+            for executable, condition in (
+                ("box_metric_node", "detector"),
+                ("eye_rotation_node", "encoder"),
+                ("servo_node", "servos"),
+            )
+            for part in (f" + (',{executable}' if '", LaunchConfiguration(condition), "' == 'true' else '')")
+        ),
+    ]
+    head = Node(
+        package="vergence_bringup",
+        executable="head_node",
+        output="screen",
+        arguments=[
+            "--nodes",
+            PythonExpression(chosen),
+            *composed_camera("left", "hold"),
+            *composed_camera("right", "follow", left_camera),
+            *own("edge_metric_node", "edge_metric_node", rig=rig),
+            *own("box_metric_node", "box_metric_node", rig=rig, **{"detector.model": LaunchConfiguration("model")}),
+            *own("eye_rotation_node", "eye_rotation_node", rig=rig),
+            *own("gaze_controller_node", "gaze_controller_node", rig=rig),
+            *own("servo_node", "servo_node", rig=rig),
+        ],
+        condition=IfCondition(composed),
+    )
+
     return LaunchDescription(
         [
             DeclareLaunchArgument("left_device", description="left camera: by-id path, serial, /dev/videoN or URL"),
@@ -105,6 +159,12 @@ def generate_launch_description() -> LaunchDescription:
                 "fastdds_profile", default_value=str(config / "fastdds.xml"), description="Fast DDS profile"
             ),
             SetEnvironmentVariable("FASTRTPS_DEFAULT_PROFILES_FILE", LaunchConfiguration("fastdds_profile")),
+            DeclareLaunchArgument(
+                "composed",
+                default_value="false",
+                description="run all nodes in one process, head_node: images pass in memory, which saves CPU time",
+            ),
+            GroupAction([PushRosNamespace(LaunchConfiguration("namespace")), head]),
             GroupAction(
                 [
                     PushRosNamespace(LaunchConfiguration("namespace")),
@@ -115,7 +175,8 @@ def generate_launch_description() -> LaunchDescription:
                     node("eye_rotation_node", "encoder"),
                     node("gaze_controller_node"),
                     node("servo_node", "servos"),
-                ]
+                ],
+                condition=UnlessCondition(composed),
             ),
         ]
     )
