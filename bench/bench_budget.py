@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from bench.budget_recording import record
-from bench.budget_run import HeadCommand, Share, cameras, measure
+from bench.budget_run import UNHEARD_S, HeadCommand, Share, cameras, measure
 from bench.photos_data import NoPhotographsError
 from bench.results import Row
 from vergence_bringup.ros.processes import NodeCommand
@@ -39,7 +39,7 @@ def run(say: Callable[[str], None]) -> list[Row]:
             eyes | servo | {name: NodeCommand.of(name) for name in LOOP[:2]}, ("metric", "controller", "servo")
         )
         say("nothing asks for anything: cameras, edge metric, servos")
-        idle = measure(eyes | servo | {"edge_metric_node": NodeCommand.of("edge_metric_node")})
+        idle = measure(eyes | servo | {"edge_metric_node": NodeCommand.of("edge_metric_node")}, settled_s=UNHEARD_S)
         say("the loop in one process")
         composed = measure({"head_node": HeadCommand(folders)})
     kinds = dict.fromkeys(("edge_metric_node", "box_metric_node", "eye_rotation_node"), "metric")

@@ -14,6 +14,7 @@ from vergence_bringup.ros.processes import Command, NodeCommand, ProcessGroup, e
 from vergence_common.domains import own_domain
 
 SETTLED_S = 12.0
+UNHEARD_S = 45.0  # after which metric nodes without subscribers receive nothing
 MEASURED_S = 15.0
 
 
@@ -53,7 +54,9 @@ def cameras(folders: Mapping[str, Path]) -> dict[str, Command]:
     }
 
 
-def measure(commands: Mapping[str, Command], empty: Sequence[str] = ()) -> dict[str, Share]:
+def measure(
+    commands: Mapping[str, Command], empty: Sequence[str] = (), settled_s: float = SETTLED_S
+) -> dict[str, Share]:
     """Run the nodes together, and empty nodes of these kinds beside them; return each one's share by its name."""
     with own_domain() as domain:
         extra = {"ROS_DOMAIN_ID": str(domain)}
@@ -61,7 +64,7 @@ def measure(commands: Mapping[str, Command], empty: Sequence[str] = ()) -> dict[
             for name, command in commands.items():
                 nodes.start(name, command)
             pids = {name: nodes.pid(name) for name in commands} | beside
-            time.sleep(SETTLED_S)
+            time.sleep(settled_s)
             before, began = {name: _cpu_s(pid) for name, pid in pids.items()}, time.monotonic()
             time.sleep(MEASURED_S)
             nodes.check()

@@ -12,6 +12,7 @@ from vergence_common.images import array_to_image
 from vergence_common.local_images import LocalImages
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
+from vergence_metric.ros import stereo_node
 from vergence_metric.ros.edge_metric_node import EdgeMetricNode
 from vergence_metric.ros.eye_rotation_node import EyeRotationNode
 from vergence_msgs.msg import EyeRotation, VergenceError
@@ -61,3 +62,19 @@ def test_images_of_the_process_are_not_subscribed(graph: Any) -> None:
         graph.executor.spin_once(timeout_sec=0.05)
     assert abs(graph.wait(error).horizontal_px + 4.0) < 0.1
     assert node.count_subscribers("left/image_raw") == 0
+
+
+def test_without_subscribers_of_its_outputs_a_node_soon_receives_no_images(graph: Any, monkeypatch: Any) -> None:
+    monkeypatch.setattr(stereo_node, "_UNHEARD_S", 0.0)
+    node = graph.start(EdgeMetricNode)
+    publishers = [graph.client.create_publisher(Image, f"{eye}/image_raw", IMAGE_QOS) for eye in ("left", "right")]
+    graph.diagnostic("outputs", lambda status: "nothing is measured" in status.message)
+    graph.wait_until(lambda: not any(p.get_subscription_count() for p in publishers), "no subscription of images")
+    error = graph.message(VergenceError, "vergence/error")
+    graph.wait_until(lambda: node._error_publisher.get_subscription_count() > 0, "our subscription is known")
+    graph.wait_until(lambda: all(p.get_subscription_count() for p in publishers), "images are subscribed again")
+    for number in range(10):
+        for publisher, eye, pixels in zip(publishers, ("left", "right"), views(5), strict=True):
+            publisher.publish(array_to_image(pixels, stamped(number, eye)))
+        graph.executor.spin_once(timeout_sec=0.05)
+    assert abs(graph.wait(error).horizontal_px - 5.0) < 0.1

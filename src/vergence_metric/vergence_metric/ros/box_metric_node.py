@@ -57,13 +57,13 @@ class BoxMetricNode(StereoNode):
         self._due_ns = 0
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
-        self._box_publisher = qos.create_publisher(BoxVergence, "vergence/box")
-        self._point_publisher = qos.create_publisher(PoseWithCovarianceStamped, "vergence/target_point")
-        self._detections_publisher = qos.create_publisher(StereoDetections, "vergence/detections")
-        self._overlay_publisher = qos.create_publisher(Image, "vergence/box_overlay", IMAGE_QOS)
+        self._box_publisher = self._output(qos, BoxVergence, "vergence/box")
+        self._point_publisher = self._output(qos, PoseWithCovarianceStamped, "vergence/target_point")
+        self._detections_publisher = self._output(qos, StereoDetections, "vergence/detections")
+        self._overlay_publisher = self._output(qos, Image, "vergence/box_overlay", IMAGE_QOS)
         vision = vision_type()
         self._vision_publishers = [
-            qos.create_publisher(vision, f"vergence/{eye}_detections") for eye in EYES if vision is not None
+            self._output(qos, vision, f"vergence/{eye}_detections") for eye in EYES if vision is not None
         ]
         self._worker: LatestWorker[ImagePair] = LatestWorker(
             self._measure, self._on_failure, "measure", settings.niceness
@@ -74,6 +74,7 @@ class BoxMetricNode(StereoNode):
         self.add_on_set_parameters_callback(self._refuse_unknown_classes)
         self._settings.on_change(self._on_settings)
         diagnostics.add("detector", self._report)
+        diagnostics.add("outputs", self._report_outputs)
 
     def _refuse_unknown_classes(self, changes: list[Parameter]) -> SetParametersResult:
         wanted = next((tuple(c.value or ()) for c in changes if c.name == "detector.classes"), ())

@@ -43,10 +43,10 @@ class EdgeMetricNode(StereoNode):
         self._measurement = PairMeasurement(_measurement_parameters(self._settings), load_rig(stereo.rig))
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
-        self._edge_publisher = qos.create_publisher(EdgeVergence, "vergence/edge")
-        self._error_publisher = qos.create_publisher(VergenceError, "vergence/error")
-        self._track_publisher = qos.create_publisher(TargetTrack, "vergence/track")
-        self._overlay_publisher = qos.create_publisher(Image, "vergence/overlay", IMAGE_QOS)
+        self._edge_publisher = self._output(qos, EdgeVergence, "vergence/edge")
+        self._error_publisher = self._output(qos, VergenceError, "vergence/error")
+        self._track_publisher = self._output(qos, TargetTrack, "vergence/track")
+        self._overlay_publisher = self._output(qos, Image, "vergence/overlay", IMAGE_QOS)
         self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
         pairing = self._settings.get(PairingParameters)
         self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit, images=self._images)
@@ -54,6 +54,7 @@ class EdgeMetricNode(StereoNode):
         self._request_subscription = qos.create_subscription(TrackRequest, "vergence/track_request", self._on_request)
         self._settings.on_change(self._on_settings)
         diagnostics.add("measurement", self._report)
+        diagnostics.add("outputs", self._report_outputs)
 
     def _on_settings(self, settings: ParameterSet) -> None:
         stereo = settings.get(StereoParameters)

@@ -45,7 +45,7 @@ class EyeRotationNode(StereoNode):
         self._last = "nothing measured yet"
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
-        self._publisher = qos.create_publisher(EyeRotation, "vergence/eye_rotation")
+        self._publisher = self._output(qos, EyeRotation, "vergence/eye_rotation")
         self._worker: LatestWorker[tuple[ImagePair, ImagePair]] = LatestWorker(
             self._measure, self._on_failure, "encoder"
         )
@@ -56,6 +56,7 @@ class EyeRotationNode(StereoNode):
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self._settings.on_change(self._on_settings)
         diagnostics.add("encoder", self._report)
+        diagnostics.add("outputs", self._report_outputs)
 
     def _on_settings(self, settings: ParameterSet) -> None:
         root = settings.get(EyeRotationNodeParameters)

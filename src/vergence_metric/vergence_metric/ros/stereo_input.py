@@ -94,6 +94,32 @@ class StereoInput:
         self._subscriptions: list[Subscription] = []
         self._images, self._topics = images, [node.resolve_topic_name(f"{name}/image_raw") for name in SIDES]
         self._lock = images.lock if images else nullcontext()
+        self._connect = partial(self._subscribe_all, qos, message_type, suffix, images)
+        self._connect()
+        for side, name in enumerate(SIDES):
+            diagnostics.add(f"{name} images", lambda side=side: self._stream_report(side))  # type: ignore[misc]
+        diagnostics.add("pairs", self._pairs_report)
+        diagnostics.add("cameras", self._cameras_report)
+
+    @property
+    def paused(self) -> bool:
+        """True while nothing is received, since `pause`."""
+        return not self._subscriptions and self._images is None
+
+    def pause(self) -> None:
+        """Receive nothing until `resume`; images shared with other nodes of the process are received all the same."""
+        if self._images is None:
+            for subscription in self._subscriptions:
+                self._node.destroy_subscription(subscription)
+            self._subscriptions.clear()
+
+    def resume(self) -> None:
+        """Receive images again after `pause`."""
+        if self.paused:
+            self._health = tuple(StreamHealth(health.topic, monotonic()) for health in self._health)
+            self._connect()
+
+    def _subscribe_all(self, qos: QosWatch, message_type: Any, suffix: str, images: LocalImages | None) -> None:
         for side, name in enumerate(SIDES):
             if images is not None and images.offers(self._topics[side]):
                 images.receive(self._topics[side], partial(self._on_local, side))
@@ -102,9 +128,6 @@ class StereoInput:
                 if images is not None:
                     images.offer(self._topics[side])
             self._subscribe(qos, CameraInfo, f"{name}/camera_info", self._on_info, side, _INFO_QOS)
-            diagnostics.add(f"{name} images", lambda side=side: self._stream_report(side))  # type: ignore[misc]
-        diagnostics.add("pairs", self._pairs_report)
-        diagnostics.add("cameras", self._cameras_report)
 
     def set_parameters(self, stereo: StereoParameters, pairing: PairingParameters) -> None:
         """Use these from the next image on; the transport stays as it is."""
@@ -220,6 +243,8 @@ class StereoInput:
 
     def _stream_report(self, side: int) -> Report:
         health = self._health[side]
+        if self.paused:
+            return Report(OK, f"{health.topic} is not received: nothing subscribes to what is measured in it")
         local = self._images is not None and self._images.offers(self._topics[side])
         publishers = int(local) or self._node.count_publishers(self._node.resolve_topic_name(health.topic))
         status = health.status(monotonic(), publishers, self._stereo.stalled_after_s)
