@@ -156,9 +156,9 @@ class Lockstep:
             GoalKind.PIXEL,
             left_eye=True,
             left_xy=(float(x), float(y)),
-            stamp_s=_clock_s(self.newest_published_s),
+            stamp_s=clock_s(self.newest_published_s),
         )
-        return self.controller.look_at(goal, _clock_s(self.world.time_s))
+        return self.controller.look_at(goal, clock_s(self.world.time_s))
 
     def _world_event(self) -> None:
         due_s = self._schedule.next_due_s()
@@ -170,8 +170,8 @@ class Lockstep:
         world.advance_to(event.due_s)
         if event.kind == "joints":
             report = world.joint_states()
-            self.metric.on_joints(_clock_s(event.due_s), report)
-            self._arrive(event.due_s + JOINT_REPORT_S, [JointReport(_clock_s(event.due_s), dict(report))])
+            self.metric.on_joints(clock_s(event.due_s), report)
+            self._arrive(event.due_s + JOINT_REPORT_S, [JointReport(clock_s(event.due_s), dict(report))])
             return
         publish_s = event.due_s + world.parameters.camera.latency_s
         self._schedule.publish(event.eye, publish_s, (event.due_s, world.expose(event.eye)))
@@ -183,7 +183,7 @@ class Lockstep:
         if not all(self._frames.values()):
             return
         (left_s, left), (right_s, right) = (self._frames[e].pop(0) for e in EYES)
-        seen = self.metric.observe(left, right, _clock_s(left_s), _clock_s(right_s))
+        seen = self.metric.observe(left, right, clock_s(left_s), clock_s(right_s))
         published_s = max(left_s, right_s) + self.world.parameters.camera.latency_s
         self._arrive(published_s + PROCESSING_S, seen, left_s)
 
@@ -197,7 +197,7 @@ class Lockstep:
             _, _, seen, exposed_s = heapq.heappop(self._arrivals)
             arrived += seen
             self.newest_exposure_s = max(self.newest_exposure_s, exposed_s)
-        command = self.controller.step(_clock_s(now_s), arrived)
+        command = self.controller.step(clock_s(now_s), arrived)
         if command.track_request is not None:
             self.metric.on_request(command.track_request)
         if command.joints_rad is not None:
@@ -242,7 +242,8 @@ def _model(lens: Lens) -> CameraModel:
     return CameraModel.from_camera_info_values(camera.width_px, camera.height_px, matrix, lens.distortion)
 
 
-def _clock_s(world_s: float) -> float:
+def clock_s(world_s: float) -> float:
+    """Return a time of the world on the clock of the stamps [s]."""
     return _CLOCK_START_S + world_s
 
 
