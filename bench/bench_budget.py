@@ -29,19 +29,21 @@ def run(say: Callable[[str], None]) -> list[Row]:
         eyes = cameras(folders)
         servo = {"servo_node": NodeCommand.of("servo_node", {"backend": "fake"})}
         say("the loop: cameras, edge metric, controller, servos")
-        loop = measure(eyes | servo | {name: NodeCommand.of(name) for name in LOOP[:2]})
+        loop = measure(eyes | servo | {name: NodeCommand.of(name) for name in LOOP[:2]}, goal=True)
         alone: dict[str, Share] = {}
         for name in ("box_metric_node", "eye_rotation_node"):
             say(f"{name} and cameras")
             alone |= measure(eyes | servo | {name: NodeCommand.of(name)})
         say("the loop beside empty nodes")
         empty = measure(
-            eyes | servo | {name: NodeCommand.of(name) for name in LOOP[:2]}, ("metric", "controller", "servo")
+            eyes | servo | {name: NodeCommand.of(name) for name in LOOP[:2]},
+            ("metric", "controller", "servo"),
+            goal=True,
         )
         say("nothing asks for anything: cameras, edge metric, servos")
         idle = measure(eyes | servo | {"edge_metric_node": NodeCommand.of("edge_metric_node")}, settled_s=UNHEARD_S)
         say("the loop in one process")
-        composed = measure({"head_node": HeadCommand(folders)})
+        composed = measure({"head_node": HeadCommand(folders)}, goal=True)
     kinds = dict.fromkeys(("edge_metric_node", "box_metric_node", "eye_rotation_node"), "metric")
     kinds |= {"gaze_controller_node": "controller", "servo_node": "servo"}
     shares = alone | loop

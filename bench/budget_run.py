@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench.budget_recording import RATE_HZ
+from bench.budget_recording import RATE_HZ, calibration_of
 from bench.results import OUT_DIR
 from vergence_bringup.ros.processes import Command, NodeCommand, ProcessGroup, environment, find_executable
 from vergence_common.domains import own_domain
@@ -16,6 +16,7 @@ from vergence_common.domains import own_domain
 SETTLED_S = 12.0
 UNHEARD_S = 45.0  # after which metric nodes without subscribers receive nothing
 MEASURED_S = 15.0
+_STARTED_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,13 @@ class HeadCommand:
 
 def camera_parameters(folder: Path) -> dict[str, object]:
     """Return the parameters of a camera_node that replays a folder of pictures."""
-    return {"device": str(folder), "replay.rate_hz": float(RATE_HZ), "width_px": 640, "height_px": 480}
+    return {
+        "device": str(folder),
+        "replay.rate_hz": float(RATE_HZ),
+        "width_px": 640,
+        "height_px": 480,
+        "camera_info_url": f"file://{calibration_of(folder)}",
+    }
 
 
 def cameras(folders: Mapping[str, Path]) -> dict[str, Command]:
@@ -55,15 +62,21 @@ def cameras(folders: Mapping[str, Path]) -> dict[str, Command]:
 
 
 def measure(
-    commands: Mapping[str, Command], empty: Sequence[str] = (), settled_s: float = SETTLED_S
+    commands: Mapping[str, Command], empty: Sequence[str] = (), settled_s: float = SETTLED_S, goal: bool = False
 ) -> dict[str, Share]:
-    """Run the nodes together, and empty nodes of these kinds beside them; return each one's share by its name."""
+    """Run the nodes together, and empty nodes of these kinds beside them; return each one's share by its name.
+
+    With `goal` the controller looks at the middle of the image while they are measured.
+    """
     with own_domain() as domain:
         extra = {"ROS_DOMAIN_ID": str(domain)}
         with ProcessGroup(OUT_DIR / "budget_logs", extra) as nodes, _empty_nodes(empty, extra) as beside:
             for name, command in commands.items():
                 nodes.start(name, command)
             pids = {name: nodes.pid(name) for name in commands} | beside
+            if goal:
+                time.sleep(_STARTED_S)
+                subprocess.run([sys.executable, "-m", "bench.budget_goal"], env=environment(extra), check=True)
             time.sleep(settled_s)
             before, began = {name: _cpu_s(pid) for name, pid in pids.items()}, time.monotonic()
             time.sleep(MEASURED_S)
