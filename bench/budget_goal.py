@@ -1,4 +1,4 @@
-"""`python -m bench.budget_goal`: asks the controller to look at the middle of the left image, and waits until it began."""
+"""`python -m bench.budget_goal`: lets the controller look at the middle of the left image; ends once that began."""
 
 import sys
 import time
