@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bench.budget_recording import RATE_HZ, calibration_of
 from bench.results import OUT_DIR
-from vergence_bringup.ros.processes import Command, NodeCommand, ProcessGroup, environment, find_executable
+from vergence_bringup.ros.processes import Command, NodeCommand, ProcessGroup, environment, find_node
 from vergence_common.domains import own_domain
 
 SETTLED_S = 12.0
@@ -35,7 +35,7 @@ class HeadCommand:
 
     def argv(self) -> list[str]:
         """Return the command line."""
-        argv = [str(find_executable("vergence_bringup", "head_node"))]
+        argv = [str(find_node("head_node"))]
         for eye, folder in self._folders.items():
             for name, value in camera_parameters(folder).items():
                 argv += ["--set", f"{eye}_camera:{name}:={value}"]

@@ -21,7 +21,7 @@ setup(
             "edge_metric_node = vergence_metric.ros.edge_metric_node:main",
             "box_metric_node = vergence_metric.ros.box_metric_node:main",
             "eye_rotation_node = vergence_metric.ros.eye_rotation_node:main",
-            "stereo_node = vergence_metric.ros.stereo_metrics:main",
+            "stereo_node = vergence_metric.ros.stereo_node:main",
         ]
     },
 )

@@ -12,7 +12,7 @@ from vergence_common.images import array_to_image
 from vergence_common.local_images import LocalImages
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
-from vergence_metric.ros import stereo_node
+from vergence_metric.ros import metric_node
 from vergence_metric.ros.edge_metric_node import EdgeMetricNode
 from vergence_metric.ros.eye_rotation_node import EyeRotationNode
 from vergence_msgs.msg import EyeRotation, VergenceError
@@ -65,7 +65,7 @@ def test_images_of_the_process_are_not_subscribed(graph: Any) -> None:
 
 
 def test_without_subscribers_of_its_outputs_a_node_soon_receives_no_images(graph: Any, monkeypatch: Any) -> None:
-    monkeypatch.setattr(stereo_node, "_UNHEARD_S", 0.0)
+    monkeypatch.setattr(metric_node, "_UNHEARD_S", 0.0)
     node = graph.start(EdgeMetricNode)
     publishers = [graph.client.create_publisher(Image, f"{eye}/image_raw", IMAGE_QOS) for eye in ("left", "right")]
     graph.diagnostic("outputs", lambda status: "nothing is measured" in status.message)

@@ -16,7 +16,7 @@ from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node, PushRosNamespace
 from launch_ros.parameter_descriptions import ParameterValue
 
-from vergence_bringup.node_table import NODES
+from vergence_bringup.node_table import HOSTS, NODES
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -104,7 +104,7 @@ def generate_launch_description() -> LaunchDescription:
         ),
     ]
     head = Node(
-        package="vergence_bringup",
+        package=HOSTS["head_node"],
         executable="head_node",
         output="screen",
         arguments=[

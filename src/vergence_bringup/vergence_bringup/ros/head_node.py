@@ -10,7 +10,7 @@ from vergence_common.composition import parse
 from vergence_common.local_images import LocalImages
 from vergence_common.node_main import run_nodes
 from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
-from vergence_metric.ros.stereo_metrics import METRICS, metric_makers
+from vergence_metric.ros.stereo_node import METRICS, metric_makers
 from vergence_servo.ros.servo_node import ServoNode
 
 CAMERAS = {"left_camera": "left", "right_camera": "right"}

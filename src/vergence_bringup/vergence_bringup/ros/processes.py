@@ -15,7 +15,7 @@ from typing import IO, Protocol
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix, get_package_share_directory
 
 from vergence_bringup.graph_errors import ProcessError
-from vergence_bringup.node_table import NODES
+from vergence_bringup.node_table import NODES, package_of
 
 _PR_SET_PDEATHSIG = 1
 
@@ -41,8 +41,8 @@ def find_executable(package: str, executable: str) -> Path:
 
 
 def find_node(executable: str) -> Path:
-    """Return the path of a node of the table; raises ProcessError where it is not built."""
-    return find_executable(NODES[executable].package, executable)
+    """Return the path of a node or host of nodes of the table; raises ProcessError where it is not built."""
+    return find_executable(package_of(executable), executable)
 
 
 class Command(Protocol):

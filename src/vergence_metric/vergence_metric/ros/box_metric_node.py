@@ -33,15 +33,15 @@ from vergence_metric.ros.box_messages import (
     vision_message,
     vision_type,
 )
+from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.stereo_node import StereoNode, limit_threads
 from vergence_msgs.msg import BoxVergence, StereoDetections
 from vergence_rig.rig import load_rig
 
 EYES = ("left", "right")
 
 
-class BoxMetricNode(StereoNode):
+class BoxMetricNode(MetricNode):
     """Measures the newest pair, at most `rate_hz` times a second, on a thread of its own."""
 
     def __init__(self, **options: Any) -> None:

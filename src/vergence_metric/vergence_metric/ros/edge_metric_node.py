@@ -22,8 +22,8 @@ from vergence_metric.measurement.parameters import GROUPS, PairMeasurementParame
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.ros.edge_messages import edge_message, error_message
+from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.stereo_node import StereoNode, limit_threads
 from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
@@ -32,7 +32,7 @@ from vergence_rig.rig import load_rig
 _JOINT_SAMPLES_NS = 500_000_000  # longer than two pairs can be apart while the tracker still follows
 
 
-class EdgeMetricNode(StereoNode):
+class EdgeMetricNode(MetricNode):
     """Measures the newest pair on its own thread; the executor's thread only receives images and pairs them."""
 
     def __init__(self, **options: Any) -> None:

@@ -24,13 +24,13 @@ from vergence_metric.eye_rotation.resting_pairs import measure_pair
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters
 from vergence_metric.ros.eye_rotation_messages import eye_rotation_message
+from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.stereo_node import StereoNode, limit_threads
 from vergence_msgs.msg import EyeRotation
 from vergence_rig.rig import load_rig
 
 
-class EyeRotationNode(StereoNode):
+class EyeRotationNode(MetricNode):
     """Measures `rate_hz` pairs a second on its own thread; the pair before each shows the image's motion."""
 
     def __init__(self, **options: Any) -> None:
