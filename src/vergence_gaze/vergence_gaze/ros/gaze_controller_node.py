@@ -52,6 +52,7 @@ class GazeControllerNode(Node):
         self._left, self._right = CameraModel(self._rig.left_camera), CameraModel(self._rig.right_camera)
         self._controller = GazeController(self._rig, _parameters(settings), 1.0 / values.control_rate_hz)
         settings.on_change(self._on_parameters)
+        self._described: dict[bool, tuple[object, ...]] = {}
         self._arrived: list[Observation] = []
         self._newest: GazeReport | None = None
         self._cycles = 0
@@ -121,6 +122,10 @@ class GazeControllerNode(Node):
         self._add(PointSighting(stamp_s, place, math.nan))
 
     def _on_camera(self, message: CameraInfo, left: bool) -> None:
+        described = (message.width, message.height, message.distortion_model, tuple(message.k), tuple(message.d))
+        if self._described.get(left) == described:
+            return  # it comes with every image
+        self._described[left] = described
         try:
             model = convert.camera_model(message)
         except CameraModelError:
@@ -147,8 +152,9 @@ class GazeControllerNode(Node):
             self._command.publish(convert.joint_command(command.joints_rad, now_s))
         if command.track_request is not None:
             self._track_requests.publish(convert.track_request(command.track_request, self._left, self._right))
-        self._state.publish(convert.gaze_state(report, now_s))
-        if math.isfinite(report.fixation_m[0]):
+        if self._state.get_subscription_count():
+            self._state.publish(convert.gaze_state(report, now_s))
+        if math.isfinite(report.fixation_m[0]) and self._fixation.get_subscription_count():
             self._fixation.publish(convert.point_stamped(report.fixation_m, report.stamp_s))
         if self._cycles % _FEEDBACK_EVERY == 0:
             self._look_at.publish_feedback(report)
