@@ -25,12 +25,11 @@ from bench.results import Row
 from vergence_metric.alignment.parameters import AlignmentParameters
 from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
-from vergence_metric.measurement.parameters import VergedParameters
 from vergence_sim.parameters import SimParameters
 
 EDGES = EdgeParameters(windows_px=(50, 100))
 UNALIGNED = AlignmentParameters(mode="none")
-THRESHOLD = VergedParameters().enter_contrast
+THRESHOLD = 0.6  # of the Gaussian-weighted contrast
 PAIRS = 600
 LARGEST_VERGED_PX, SMALLEST_UNVERGED_PX, LARGEST_UNVERGED_PX = 1.0, 8.0, 150.0
 

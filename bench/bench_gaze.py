@@ -33,7 +33,7 @@ EVERYWHERE: tuple[Part, ...] = (
 )
 BY_DEFAULT: tuple[Part, ...] = (
     figures.search_rows,
-    figures.by_class_rows,
+    figures.boxes_alone_rows,
     figures.occlusion_by_track_rows,
     figures.crossing_by_track_rows,
 )

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import cv2
 
-from bench import photos_disparity, photos_figures, photos_scenes
+from bench import photos_contrast, photos_disparity, photos_figures, photos_scenes
 from bench.photos_data import NoPhotographsError, pair_names
 from bench.photos_trials import run as run_trial
 from bench.results import Row, table
@@ -44,7 +44,8 @@ def run(say: Callable[[str], None], clicks: int | None = None) -> list[Row]:
     outcomes = outcomes_of(run_trial, trials, _TRIALS_OF_A_JOB, "clicks on photographs", say)
     for line in (*photos_figures.by_pair(outcomes), "", *photos_figures.reasons(outcomes)):
         say(line)
-    return photos_figures.rows(outcomes, clicks) + _scene_rows(say) + _disparity_rows(say, from_photographs=True)
+    rows = photos_figures.rows(outcomes, clicks) + _scene_rows(say) + photos_contrast.rows()
+    return rows + _disparity_rows(say, from_photographs=True)
 
 
 def _scene_rows(say: Callable[[str], None]) -> list[Row]:

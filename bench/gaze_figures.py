@@ -15,7 +15,7 @@ from bench.results import Row
 DEFAULT = Setting()
 KEPT_DEG = 1.0
 STEADY_FROM_S = 1.6
-GIVEN_SUFFIX = {"boxes": "", "click": ".by_track", "class": ".by_class"}
+GIVEN_SUFFIX = {"class": "", "click": ".by_track", "boxes": ".boxes_alone"}
 _STEP_S = 1.5
 
 
@@ -90,17 +90,17 @@ class StaticFigures:
 
 
 def static_rows(setting: Setting) -> list[Row]:
-    """Targets at rest: verged or not, how fast, and how well declared; the default's once by pairs, once by boxes."""
+    """Targets at rest: verged or not, how fast, and how well declared; the default's once by pairs, once by class."""
     count = counts(setting).static
     if setting != DEFAULT:
         figures = StaticFigures(run_all(scenarios.static(count, "pairs", seed=12), setting), setting)
         rows = figures.rows(setting.suffix)
     else:
         by_pairs = run_all(scenarios.static(count, "pairs"), setting)
-        by_boxes = run_all(scenarios.static(count, "boxes", seed=11), setting)
-        figures = StaticFigures(by_pairs + by_boxes, setting)
+        by_class = run_all(scenarios.static(count, "class", seed=11), setting)
+        figures = StaticFigures(by_pairs + by_class, setting)
         rows = figures.rows("")
-        rows += StaticFigures(by_pairs, setting).rows(".by_pairs") + StaticFigures(by_boxes, setting).rows(".by_boxes")
+        rows += StaticFigures(by_pairs, setting).rows(".by_pairs") + StaticFigures(by_class, setting).rows(".by_class")
     return [*rows, Row(f"gaze.residual_deg{servo_suffix(setting)}", quantile(figures.residual_deg, 0.5), "deg")]
 
 
@@ -140,10 +140,10 @@ def onset_s(trace: Trace, moves_from_s: float) -> float:
     return math.inf
 
 
-def by_class_rows(setting: Setting) -> list[Row]:
-    """A detected class with the tracker beside the detector, as the graph has them, against the detector alone."""
-    values, alone = (_given_rows(setting, given) for given in ("class", "boxes"))
-    return [replace(v, against="boxes alone", against_value=a.value) for v, a in zip(values, alone, strict=True)]
+def boxes_alone_rows(setting: Setting) -> list[Row]:
+    """A detected class without a tracker, against the detector and the tracker that it asks, as the graph has them."""
+    alone, values = (_given_rows(setting, given) for given in ("boxes", "class"))
+    return [replace(a, against="with the tracker", against_value=v.value) for v, a in zip(values, alone, strict=True)]
 
 
 def _given_rows(setting: Setting, given: str) -> list[Row]:
@@ -199,7 +199,7 @@ def pursuit_rows(setting: Setting) -> list[Row]:
     return rows
 
 
-def occlusion_rows(setting: Setting, given: str = "boxes") -> list[Row]:
+def occlusion_rows(setting: Setting, given: str = "class") -> list[Row]:
     """One second behind something nearer."""
     traces = run_all(scenarios.occlusions(counts(setting).occlusions, given), setting)
     times = [trace.declared_from(3.0) - 3.0 for trace in traces]
@@ -215,7 +215,7 @@ def occlusion_by_track_rows(setting: Setting) -> list[Row]:
     return occlusion_rows(setting, "click")
 
 
-def crossing_rows(setting: Setting, given: str = "boxes") -> list[Row]:
+def crossing_rows(setting: Setting, given: str = "class") -> list[Row]:
     """A target that passes before another at a different depth: which target the eyes fixate afterwards.
 
     Judged by the median of the second after it has stopped: overshoot there does not count as loss.

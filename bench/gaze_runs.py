@@ -51,7 +51,6 @@ class Scenario:
     given: str = "pairs"
     seed: int = 0
     visible: Callable[[float], bool] = lambda time_s: True
-    clutter: Callable[[float], Array] | None = None
     encoder: Encoder | None = None
     mistaken: Mapping[str, Callable[[float], Array | None]] = field(default_factory=dict)
 
@@ -113,7 +112,9 @@ class Realism:
     noise_px: float = 0.4
     stamp_error_s: float = 0.003
     frame_rate_hz: float = 30.0
-    box: Mapping[str, float] = field(default_factory=lambda: {"rate_hz": 15.0, "latency_s": 0.04, "noise_px": 1.2})
+    box: Mapping[str, float] = field(
+        default_factory=lambda: {"rate_hz": 15.0, "latency_s": 0.04, "noise_px": 1.2, "surface_px": 0.4}
+    )
 
 
 def real_servo(spec: ServoSpec, spread: float, random: np.random.Generator) -> ServoSpec:
@@ -141,11 +142,11 @@ def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np
         noise_px=realism.noise_px,
         stamp_error_s=random.uniform(-realism.stamp_error_s, realism.stamp_error_s),
         track=not boxes or scenario.given == "class",
-        fovea=True,
         boxes=boxes,
         box_frame_ticks=frame_ticks if frame_rate else round(300.0 / realism.box["rate_hz"]),
         box_latency_s=setting.latency_ms * 1e-3 + (0.0 if frame_rate else realism.box["latency_s"]),
         box_noise_px=realism.noise_px if frame_rate else realism.box["noise_px"],
+        surface_noise_px=math.nan if frame_rate else realism.box["surface_px"],
         box_miss_share=0.0 if frame_rate else 0.05,
     )
 
@@ -201,7 +202,6 @@ def run(
         scenario.seed,
         scenario.start_rad,
         lambda time_s: time_s >= 0.0 and scenario.visible(time_s),
-        scenario.clutter,
         scenario.mistaken,
         {name: real_servo(servo, realism.servo_spread, random) for name, _ in rig.joints.items()},
         # The target appears at 0; the head has been awake for a while by then, at any phase of its frames.

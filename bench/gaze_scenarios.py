@@ -79,7 +79,7 @@ def static(count: int, given: str, seed: int = 1) -> list[Scenario]:
     return scenarios
 
 
-def out_of_view(count: int, given: str = "boxes", seed: int = 2) -> list[Scenario]:
+def out_of_view(count: int, given: str = "class", seed: int = 2) -> list[Scenario]:
     """Targets anywhere in reach that neither eye sees at the start."""
     scenarios: list[Scenario] = []
     i = 0
@@ -154,7 +154,7 @@ def sinusoids(frequencies_hz: tuple[float, ...], given: str = "pairs", seed: int
 
 
 def occlusions(count: int, given: str = "pairs", seed: int = 7) -> list[Scenario]:
-    """A fixated target hidden for one second by something nearer that takes its place at the fovea."""
+    """A fixated target hidden for one second."""
     scenarios = []
     for i in range(count):
         random = np.random.default_rng([seed, i])
@@ -167,13 +167,12 @@ def occlusions(count: int, given: str = "pairs", seed: int = 7) -> list[Scenario
                 given,
                 seed=1000 * seed + i,
                 visible=lambda time_s: not 2.0 <= time_s < 3.0,
-                clutter=still(0.6 * point),
             )
         )
     return scenarios
 
 
-def crossings(count: int, given: str = "boxes", seed: int = 10) -> list[Scenario]:
+def crossings(count: int, given: str = "class", seed: int = 10) -> list[Scenario]:
     """A target that passes at 10 degrees/s before another at 1.6 to 2.2 times its distance, straight ahead at 2.5 s.
 
     While the two overlap, every estimator takes one for the other about half of the time, in bursts of a tenth of a

@@ -26,7 +26,6 @@ from vergence_gaze.ros import gaze_messages
 from vergence_metric.disparity.angular_disparity import angular_disparity
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import PairMeasurementParameters
-from vergence_metric.ros.edge_messages import error_message
 from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_rig.camera import CameraModel
 from vergence_rig.joint_history import JointHistory
@@ -103,10 +102,6 @@ class MetricOfPairs:
         skew_s = right_stamp_s - left_stamp_s
         measurement, models = self._measurement, self._models
         edge = measurement.edge(left, right)
-        disparity = measurement.disparity(edge)
-        angular = angular_disparity(*models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px)
-        error = error_message(disparity, angular, edge.least_contrast, header, skew_s)
-        error.verged = measurement.verged(edge, error.horizontal_px, error.confidence)
         now_ns = _ns(left_stamp_s)
         eyes = self._joints.at(now_ns, _ns(right_stamp_s))
         passed = self._joints.samples_between(now_ns - _LOOK_BACK_NS, now_ns)
@@ -115,8 +110,7 @@ class MetricOfPairs:
         tracked = track_message(track, edge, angular, header, skew_s)
         measurement.update_alignment()
         return [
-            gaze_messages.error_contrast(error),
-            gaze_messages.fovea_disparity(error, models[0].fx_px),
+            gaze_messages.track_contrast(tracked),
             gaze_messages.track_sighting(tracked, models[0]),
         ]
 

@@ -97,7 +97,9 @@ build() {
   export PYTHONWARNINGS="ignore::DeprecationWarning,ignore:::setuptools.command.install,ignore:::setuptools.command.develop,ignore:::pkg_resources"
   find src -maxdepth 2 -name '*.egg-info' -type d -exec rm -rf {} + 2>/dev/null || true
   mkdir -p log
-  if ! colcon --log-base log build --base-paths src --symlink-install --executor sequential \
+  # By this Python, which the executables then start with: apt's colcon alone would start them without this environment.
+  command -v colcon >/dev/null || fail "no colcon: apt install python3-colcon-common-extensions"
+  if ! python "$(command -v colcon)" --log-base log build --base-paths src --symlink-install --executor sequential \
     --event-handlers console_start_end+ desktop_notification- status- \
     --cmake-args -DBUILD_TESTING=OFF "-DPython3_EXECUTABLE=$venv/bin/python" "-DPYTHON_EXECUTABLE=$venv/bin/python" \
     >log/bootstrap.txt 2>&1; then

@@ -25,7 +25,6 @@ from matplotlib import pyplot as plt
 
 from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric
-from vergence_metric.measurement.parameters import VergedParameters
 from vergence_sim.fixation import fixated_surface, look_at
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
@@ -34,6 +33,7 @@ Figures = NDArray[np.float64]
 
 ERRORS_DEG = np.round(np.arange(-5.0, 5.01, 0.25), 2)
 NEAR_VERGENCE_DEG = 0.5
+FOVEAL_CONTRAST = 0.6
 FORMS = ("plain", "robust", "contrast")
 TITLES = {"plain": "plain metric [px]", "robust": "robust form [px]", "contrast": "contrast"}
 PAPER = "about 5 px in every window and direction, except 15.29 px at 300x300 right to left"
@@ -137,7 +137,7 @@ def plot(result: Sweep, windows_px: Sequence[int], path: Path) -> None:
         label="chance, largest",
     )
     axes[2].plot(ERRORS_DEG, result.foveal, color="crimson", linewidth=1.6, label="foveal")
-    axes[2].axhline(VergedParameters().enter_contrast, color="crimson", linestyle=":", linewidth=1.0)
+    axes[2].axhline(FOVEAL_CONTRAST, color="crimson", linestyle=":", linewidth=1.0)
     for axis in axes:
         axis.set_ylim(bottom=0.0)
     lines = [*axes[0].get_lines()[: len(windows_px)], axes[0].get_lines()[-1], axes[2].get_lines()[-2]]
@@ -192,7 +192,7 @@ def page(results: Sequence[Sweep], windows_px: Sequence[int], images: Sequence[s
     ratio = np.array([r.figures["plain"][vergence].mean() / np.nanmedian(r.figures["plain"]) for r in results])
     judged = [(r.foveal[vergence], float(np.nanmin(r.foveal[np.abs(ERRORS_DEG) >= 1.0]))) for r in results]
     separation = [[r.scene.name, f"{v:.2f}", f"{u:.2f}"] for r, (v, u) in zip(results, judged, strict=True)]
-    threshold = VergedParameters().enter_contrast
+    threshold = FOVEAL_CONTRAST
     passing, dipping = (sum(pair[i] <= threshold for pair in judged) for i in (0, 1))
     return (
         f"""# The edge metric against vergence error
@@ -207,7 +207,7 @@ the simulator's default faults: noise, exposure and white balance, JPEG, roll an
 
 - **plain** is the paper's metric, **robust** its truncated, oriented form weighted to the fovea, **contrast** the
   oriented, truncated distance over its chance level; curves are means of both directions. **foveal** is the contrast
-  by which `verged` is decided.
+  weighted by a Gaussian about the centre.
 - The **minimum** is the error at which a curve is least. Its **basin** is the range around it in which the curve stays
   below the mean of its least and its median value.
 
@@ -233,8 +233,8 @@ Of {of} curves each (scenes times windows) the minimum lies within {NEAR_VERGENC
 
 ## Telling vergence from clutter
 
-Foveal contrast at vergence, and its least value at any error of 1 degree or more (the default threshold is
-{threshold:g}; `verged` also needs a small, confident signed error):
+Foveal contrast at vergence, and its least value at any error of 1 degree or more (a threshold of
+{threshold:g} separates them best; `verged` uses the small windows' contrast, and a small, confident signed error):
 
 {table(["scene", "at vergence", "least at 1 degree or more"], separation)}
 

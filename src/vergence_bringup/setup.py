@@ -11,6 +11,8 @@ setup(
         ("share/vergence_bringup", ["package.xml", "LICENSE", "CHANGELOG.rst"]),
         ("share/vergence_bringup/config", [path for path in glob("config/*") if not path.endswith("~")]),
         ("share/vergence_bringup/launch", glob("launch/*.launch.py")),
+        ("bin", ["scripts/vergence"]),  # colcon puts this folder on the PATH
+        ("share/vergence_bringup/systemd", glob("systemd/*")),
         ("share/vergence_bringup/urdf", glob("urdf/*")),
     ],
     package_data={"vergence_bringup": ["py.typed"]},
@@ -24,7 +26,7 @@ setup(
     entry_points={
         "console_scripts": [
             "vergence = vergence_bringup.command_line:main",
-            "head_node = vergence_bringup.ros.head_node:main",
+            "head_node = vergence_bringup.executables:head_node",
         ]
     },
 )

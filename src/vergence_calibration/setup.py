@@ -18,7 +18,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "calibrate_servos = vergence_calibration.ros.calibrate_servos:main",
+            "calibrate_servos = vergence_calibration.executables:calibrate_servos",
         ]
     },
 )

@@ -18,8 +18,8 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "camera_node = vergence_camera.ros.camera_node:main",
-            "list_cameras = vergence_camera.list_cameras:main",
+            "camera_node = vergence_camera.executables:camera_node",
+            "list_cameras = vergence_camera.executables:list_cameras",
         ]
     },
 )

@@ -18,7 +18,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "gaze_controller_node = vergence_gaze.ros.gaze_controller_node:main",
+            "gaze_controller_node = vergence_gaze.executables:gaze_controller_node",
         ]
     },
 )

@@ -18,10 +18,10 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "edge_metric_node = vergence_metric.ros.edge_metric_node:main",
-            "box_metric_node = vergence_metric.ros.box_metric_node:main",
-            "eye_rotation_node = vergence_metric.ros.eye_rotation_node:main",
-            "stereo_node = vergence_metric.ros.stereo_node:main",
+            "edge_metric_node = vergence_metric.executables:edge_metric_node",
+            "box_metric_node = vergence_metric.executables:box_metric_node",
+            "eye_rotation_node = vergence_metric.executables:eye_rotation_node",
+            "stereo_node = vergence_metric.executables:stereo_node",
         ]
     },
 )

@@ -18,7 +18,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "servo_node = vergence_servo.ros.servo_node:main",
+            "servo_node = vergence_servo.executables:servo_node",
         ]
     },
 )

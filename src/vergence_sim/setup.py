@@ -18,8 +18,8 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
-            "photo_node = vergence_sim.ros.photo_node:main",
-            "sim_node = vergence_sim.ros.sim_node:main",
+            "photo_node = vergence_sim.executables:photo_node",
+            "sim_node = vergence_sim.executables:sim_node",
         ]
     },
 )

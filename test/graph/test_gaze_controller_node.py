@@ -21,11 +21,11 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 from vergence_common.stamps import to_stamp
-from vergence_gaze.estimation.observations import EdgeContrast, FoveaDisparity, JointReport, TrackSighting
+from vergence_gaze.estimation.observations import EdgeContrast, JointReport, TrackSighting
 from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import EdgeVergence, GazeState, TargetTrack, VergenceError
+from vergence_msgs.msg import EdgeVergence, GazeState, TargetTrack, TrackRequest
 from vergence_rig.rig import JOINT_NAMES, default_rig
 
 pytestmark = pytest.mark.graph
@@ -51,11 +51,11 @@ class HeadNode(Node):
         self._time = self.create_publisher(Clock, "/clock", 10)
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self._edge = self.create_publisher(EdgeVergence, "vergence/edge", 10)
-        self._error = self.create_publisher(VergenceError, "vergence/error", 10)
         self._track = self.create_publisher(TargetTrack, "vergence/track", 10)
         self.commands: list[list[float]] = []
         self.create_subscription(JointState, "joint_command", self._on_command, 10)
         self.create_subscription(GazeState, "gaze/state", self._on_state, 10)
+        self.create_subscription(TrackRequest, "vergence/track_request", self._on_request, 10)
         self.create_timer(0.001, self._turn)
 
     @property
@@ -67,6 +67,9 @@ class HeadNode(Node):
         by_name = dict(zip(message.name, message.position, strict=True))
         self.commands.append([by_name[name] for name in JOINT_NAMES])
         self.head.command(np.array(self.commands[-1]))
+
+    def _on_request(self, message: TrackRequest) -> None:
+        self.head.track_for(message.goal_id)
 
     def _on_state(self, message: GazeState) -> None:
         self._answered_s = self.head.time_s
@@ -92,25 +95,16 @@ class HeadNode(Node):
             edge.left_to_right_px = edge.right_to_left_px = [seen.metric_px, 9.0]
             edge.header.stamp = self._stamp(seen.stamp_s)
             self._edge.publish(edge)
-        elif isinstance(seen, FoveaDisparity):
-            error = VergenceError(
-                pair_skew_s=seen.skew_s,
-                horizontal_rad=seen.horizontal_rad,
-                sigma_px=seen.sigma_rad * FOCAL_PX,
-                confidence=seen.confidence,
-                status=VergenceError.STATUS_OK if seen.usable else VergenceError.STATUS_NO_MATCH,
-            )
-            error.header.stamp = self._stamp(seen.stamp_s)
-            self._error.publish(error)
         elif isinstance(seen, TrackSighting):
             track = TargetTrack(
                 pair_skew_s=seen.skew_s,
                 track_id=seen.track_id,
+                goal_id=seen.goal_id,
                 left_x_px=319.5 + FOCAL_PX * seen.left_x,
                 left_y_px=239.5 + FOCAL_PX * seen.left_y,
                 disparity_rad=seen.disparity_rad,
                 sigma_px=seen.sigma_rad * FOCAL_PX,
-                status=TargetTrack.STATUS_OK if seen.usable else TargetTrack.STATUS_LOCKING,
+                status=TargetTrack.STATUS_OK if seen.usable else TargetTrack.STATUS_LOST,
             )
             track.header.stamp = self._stamp(seen.stamp_s)
             self._track.publish(track)

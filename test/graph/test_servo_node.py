@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 import rclpy
+import yaml
 from builtin_interfaces.msg import Duration
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.context import Context
@@ -25,8 +26,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from vergence_common.stamps import to_stamp
 from vergence_rig.parameters import ParameterError
-from vergence_servo.drivers.protocol import DriverUnavailableError
+from vergence_servo.drivers.protocol import ChannelError, DriverUnavailableError
 from vergence_servo.ros.servo_node import ServoNode
+from vergence_servo.testing.pigpio_daemon import PigpioDaemon
 
 pytestmark = pytest.mark.graph
 
@@ -51,8 +53,8 @@ def make_chip(root: Path, channels: int = 4) -> Path:
 class Graph:
     """servo_node and a client on one executor."""
 
-    def __init__(self, root: Path, **overrides: Any) -> None:
-        self.chip = make_chip(root)
+    def __init__(self, root: Path, pwm_channels: int = 4, **overrides: Any) -> None:
+        self.chip = make_chip(root, pwm_channels)
         self.context = Context()
         rclpy.init(context=self.context)
         values = {
@@ -331,3 +333,37 @@ def test_configurations_that_cannot_be_end_the_node(
 ):
     with pytest.raises(kind, match=text):
         make_graph(**overrides)
+
+
+def test_a_pi_4_drives_the_pans_by_kernel_pwm_and_the_tilt_by_another_backend(
+    make_graph: Callable[..., Graph], tmp_path: Path
+):
+    """Two PWM channels for three servos: each joint's command goes to the backend that servos.yaml names for it."""
+    daemon = PigpioDaemon()
+    path = tmp_path / "servos.yaml"
+    servos = {name: {"channel": JOINTS.index(name), "model": "sg90"} for name in JOINTS}
+    servos["tilt"] |= {"channel": 17, "backend": "pigpio"}
+    path.write_text(yaml.safe_dump({"servos": servos}))
+    try:
+        graph = make_graph(pwm_channels=2, servos=str(path), **{"pigpio.port": daemon.port})
+        both = {"pan_left": 0.3, "pan_right": -0.3, "tilt": 0.2}
+        graph.until(lambda: daemon.pulses.get(17) == 1625, lambda: graph.command(**both))
+        graph.drive(pan_left=0.3, pan_right=-0.3)
+        # The limits of a joint are the same on every backend: 45 degrees.
+        graph.until(lambda: daemon.pulses[17] == 2000, lambda: graph.command(tilt=3.0))
+        assert graph.node is not None
+        assert [driver.resolution_us for driver in graph.node._drivers.by_joint.values()] == [0.02, 0.02, 5]
+        graph.until(lambda: graph.value("servos", "backend") == "kernel_pwm: pan_left, pan_right; pigpio: tilt")
+        graph.call(Trigger, "release", Trigger.Request())
+        assert [graph.duty_us(0), graph.duty_us(1), daemon.pulses[17]] == [0.0, 0.0, 0]
+        graph.drive(pan_left=0.1)
+        graph.until(lambda: daemon.pulses[17] > 0, lambda: graph.command(tilt=0.1))
+        graph.node.close()
+        assert [graph.duty_us(0), graph.duty_us(1), daemon.pulses[17]] == [0.0, 0.0, 0]
+    finally:
+        daemon.close()
+
+
+def test_a_third_servo_on_two_channels_is_refused_with_the_way_out(make_graph: Callable[..., Graph]):
+    with pytest.raises(ChannelError, match=r"channel must be 0 to 1: got 2.*another backend in servos\.yaml"):
+        make_graph(pwm_channels=2)

@@ -11,7 +11,7 @@ from vergence_rig.parameters import ParameterSpec
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 
-NOT_EXECUTABLES = {"rig", "servos"}
+NOT_EXECUTABLES = {"diagnostics", "rig", "servos"}
 
 
 def specs_of(executable: str) -> dict[str, ParameterSpec]:
@@ -52,6 +52,16 @@ def test_required_ones_are_shown_but_left_to_the_user(executable: str) -> None:
     for name, spec in specs_of(executable).items():
         if spec.required:
             assert f"# {name}:" in text
+
+
+def test_every_nodes_diagnostics_are_in_one_group_of_the_aggregators() -> None:
+    document = yaml.safe_load((CONFIG / "diagnostics.yaml").read_text())
+    groups = [group for group in document["/**"]["ros__parameters"].values() if isinstance(group, dict)]
+    assert {group["type"] for group in groups} == {"diagnostic_aggregator/GenericAnalyzer"}
+    for executable in NODES:
+        for name in (f"{executable}: qos", f"head/left/{executable}: qos"):
+            matching = [group["path"] for group in groups if any(text in name for text in group["contains"])]
+            assert len(matching) == 1, (name, matching)
 
 
 def test_the_camera_reports_the_skew_at_which_pairs_are_refused() -> None:

@@ -45,10 +45,18 @@ def test_both_eyes_come_with_their_stamps_frames_and_calibration(graph: Any, sim
     assert compressed_to_array(graph.wait(jpeg)).shape == (480, 640, 3)
 
 
+def test_the_diagnostics_name_what_they_are_about(graph: Any, sim: SimNode) -> None:
+    assert graph.diagnostic("sim_node: cameras", lambda status: True).hardware_id == "simulated head"
+
+
 def test_a_command_turns_the_head_and_the_truth_follows(graph: Any, sim: SimNode) -> None:
     command = graph.client.create_publisher(JointState, "joint_command", 10)
     graph.wait_until(command.get_subscription_count, "sim_node to listen")
+    turning = graph.message(
+        JointState, "joint_states", lambda m: dict(zip(m.name, m.velocity, strict=True))["pan_left"] > 0.5
+    )
     command.publish(JointState(name=["pan_left", "tilt"], position=[0.2, -0.1]))
+    assert graph.wait(turning).name == ["pan_left", "pan_right", "tilt"]
     arrived = graph.wait(graph.message(JointState, "joint_states", lambda m: 0.2 in m.position and -0.1 in m.position))
     angles = dict(zip(arrived.name, arrived.position, strict=True))
     assert angles == pytest.approx({"pan_left": 0.2, "pan_right": 0.0, "tilt": -0.1})

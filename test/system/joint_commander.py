@@ -1,6 +1,6 @@
 """A small controller as a process of its own: publishes joint_command and says what it sees.
 
-    python joint_commander.py steady ANGLE_RAD        50 commands a second until it is ended
+    python joint_commander.py steady ANGLE_RAD [JOINT...]    50 commands a second until it is ended; of pan_left
     python joint_commander.py latency PIPE COUNT      commands one at a time; each is awaited in PIPE
 
 Prints one line of JSON when it has been matched, and one when it is done.
@@ -10,6 +10,7 @@ import json
 import os
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -22,8 +23,8 @@ from sensor_msgs.msg import JointState
 PERIOD_S = 0.02
 
 
-def publish(node: Node, publisher: Publisher, angle_rad: float) -> None:
-    message = JointState(name=["pan_left"], position=[angle_rad])
+def publish(node: Node, publisher: Publisher, angle_rad: float, joints: Sequence[str] = ("pan_left",)) -> None:
+    message = JointState(name=list(joints), position=[angle_rad] * len(joints))
     message.header.stamp = node.get_clock().now().to_msg()
     publisher.publish(message)
 
@@ -67,7 +68,7 @@ def main() -> None:
         print(json.dumps({"latencies_ms": latencies_ms(node, publisher, pipe, int(sys.argv[3]))}), flush=True)
         return
     while True:
-        publish(node, publisher, float(sys.argv[2]))
+        publish(node, publisher, float(sys.argv[2]), sys.argv[3:] or ("pan_left",))
         rclpy.spin_once(node, timeout_sec=PERIOD_S)
 
 

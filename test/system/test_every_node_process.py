@@ -2,6 +2,7 @@
 
 import signal
 import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -71,6 +72,37 @@ def test_sigterm_at_any_moment_ends_sim_node_without_complaint(delay_s: float, d
             process.kill()
     # While Python still imports, the signal simply ends it: there is nothing to release yet.
     assert process.returncode in (0, -signal.SIGTERM), errors
+    assert "Traceback" not in errors
+
+
+SLOW_WORLD = """
+import sys, threading
+from vergence_common.node_main import run_node
+from vergence_sim.ros.sim_node import SimNode
+
+class SlowNode(SimNode):
+    def _make_world(self):
+        print("making the world", flush=True)
+        threading.Event().wait()
+
+sys.exit(run_node(SlowNode))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_sim_node_while_it_builds_its_room(number: int, domain_id: int) -> None:
+    """The room here is never ready."""
+    with subprocess.Popen(
+        [sys.executable, "-c", SLOW_WORLD], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "making the world\n"
+        process.send_signal(number)
+        try:
+            _, errors = process.communicate(timeout=TIMEOUT_S)
+        finally:
+            process.kill()
+    assert process.returncode == 0, errors
     assert "Traceback" not in errors
 
 

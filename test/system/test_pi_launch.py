@@ -88,11 +88,20 @@ def wait_for(condition: Callable[[], bool], what: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), [("backend", "gpiozero"), ("servos", "/nowhere/servos.yaml")])
-def test_a_configuration_that_is_refused_ends_the_launch(start: Start, name: str, value: str) -> None:
+def test_wrong_arguments_end_the_launch_before_servo_node_starts(start: Start, name: str, value: str) -> None:
     launch = start(**{"backend": "fake", name: value})
+    assert launch.process.wait(PATIENCE_S) == 1
+    assert "process started" not in launch.said
+    assert "pi.launch.py starts nothing" in launch.said
+
+
+def test_a_configuration_that_servo_node_refuses_ends_the_launch(start: Start, tmp_path: Path) -> None:
+    (tmp_path / "rig.yaml").write_text("baseline_m: wide\n")
+    launch = start(backend="fake", rig=tmp_path / "rig.yaml")
     assert launch.process.wait(PATIENCE_S) == 0
     assert launch.said.count("process started") == 1
     assert "exit code 2" in launch.said
+    assert "servo_node ended (it could not start)" in launch.said
 
 
 def test_a_crash_is_followed_by_a_new_start_and_a_clean_end_is_the_end(start: Start) -> None:

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vergence_servo.testing.pigpio_daemon import PigpioDaemon
+
 pytestmark = pytest.mark.system
 
 ROOT = Path(__file__).parents[2]
@@ -131,6 +133,22 @@ def test_the_guardian_releases_what_a_killed_node_leaves(start: Start, wires: Wi
     node = moving_node(start, wires, "-p", "release_timeout_s:=0.0")
     node.send_signal(signal.SIGKILL)
     wait_for(lambda: wires.pulse_us(0) == 0.0, "the guardian releases")
+
+
+def test_every_backend_that_pulses_on_has_a_guardian(start: Start, wires: Wires, tmp_path: Path):
+    daemon = PigpioDaemon()
+    path = tmp_path / "servos.yaml"
+    path.write_text("servos: {pan_left: {channel: 0}, tilt: {channel: 17, backend: pigpio}}\n")
+    more = ("servos:=" + str(path), f"pigpio.port:={daemon.port}", "joints:=[pan_left,tilt]", "park_rad:=[0.0,0.0]")
+    try:
+        node = start(*servo_argv(wires, *(part for value in more for part in ("-p", value))))
+        commander = start(*commander_argv("steady", "0.2", "pan_left", "tilt"))
+        wait_for(lambda: wires.pulse_us(0) > 0 and daemon.pulses.get(17, 0) > 0, "both servos are driven")
+        commander.send_signal(signal.SIGKILL)
+        node.send_signal(signal.SIGKILL)
+        wait_for(lambda: wires.pulse_us(0) == 0.0 and daemon.pulses[17] == 0, "the guardians release both")
+    finally:
+        daemon.close()
 
 
 def test_without_a_guardian_hardware_goes_on_pulsing_and_the_next_start_stops_it(start: Start, wires: Wires):

@@ -17,6 +17,7 @@ from vergence_bringup.demo.report import write_report
 from vergence_bringup.demo.result import StationResult, summary, table, unfinished
 from vergence_bringup.figures.pictures import read_image
 from vergence_rig.geometry import EyeAngles
+from vergence_rig.install_hint import install_hint
 from vergence_rig.rig import default_rig
 from vergence_sim.photo.pair import PhotoPair
 
@@ -127,7 +128,7 @@ def test_without_scikit_image_one_sentence_says_what_to_do(tmp_path, monkeypatch
     monkeypatch.setitem(sys.modules, "skimage.data", None)
     assert main(["demo", "--out", str(tmp_path), "--photos"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "pip install scikit-image" in line
+    assert install_hint("scikit-image") in line
     assert "LEFT RIGHT" in line
 
 

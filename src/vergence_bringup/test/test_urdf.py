@@ -1,11 +1,13 @@
 """The URDF describes the same head as rig.yaml: same joints, limits, baseline and axes."""
 
+import dataclasses
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from vergence_bringup.launching.head_urdf import head_urdf
 from vergence_rig.geometry import eye_position, rotation_rig_from_optical
 from vergence_rig.rig import JOINT_NAMES, default_rig
 
@@ -42,6 +44,19 @@ def test_limits_are_the_rigs(joints):
         joint = rig.joints[name]
         found = [float(limit[key]) for key in ("lower", "upper", "velocity")]
         assert found == pytest.approx([joint.lower_rad, joint.upper_rad, joint.max_speed_rad_s])
+
+
+def test_the_urdf_of_another_rig_has_its_baseline_and_limits():
+    rig = default_rig()
+    pan = dataclasses.replace(rig.joints.pan_left, lower_rad=-0.5, max_speed_rad_s=2.0)
+    rig = dataclasses.replace(rig, baseline_m=0.08, joints=dataclasses.replace(rig.joints, pan_left=pan))
+    root = ElementTree.fromstring(head_urdf(URDF.read_text(encoding="utf-8"), rig))
+    joints = {joint.attrib["name"]: joint for joint in root.iter("joint")}
+    assert _numbers(joints["pan_left"].find("origin"), "xyz") == pytest.approx([0, 0.04, 0])
+    assert _numbers(joints["pan_right"].find("origin"), "xyz") == pytest.approx([0, -0.04, 0])
+    limit = joints["pan_left"].find("limit")
+    assert limit is not None
+    assert (float(limit.attrib["lower"]), float(limit.attrib["velocity"])) == (-0.5, 2.0)
 
 
 @pytest.mark.parametrize("eye", ["left", "right"])

@@ -5,6 +5,8 @@ import importlib
 import sys
 from collections.abc import Sequence
 
+from vergence_bringup.machine import build_hint
+
 COMMANDS = {
     "demo": ("vergence_bringup.demo.ros.command", "run the graph on the simulated head and write a report"),
     "measure": ("vergence_bringup.commands.measure", "compute metric I (and II) of two stored images"),
@@ -13,13 +15,36 @@ COMMANDS = {
         "vergence_calibration.ros.identify",
         "measure latencies, pixels per radian and signs of a running head and write them to YAML",
     ),
+    "look": ("vergence_bringup.ros.look", "look at a pixel, a class, a point or by angles, and say whether it verged"),
     "watch": ("vergence_bringup.ros.watch", "show a running graph in the terminal"),
     "doctor": ("vergence_bringup.commands.doctor", "check this machine: what is missing, and how to install it"),
 }
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run one subcommand and return its exit status: 0 success, 1 a check failed, 2 invalid input."""
+    """Run one subcommand and return its exit status: 0 success, 1 a check failed, 2 invalid input, 130 Ctrl-C."""
+    try:
+        try:
+            options = _options(args)
+        except ModuleNotFoundError as error:
+            print(f"vergence: this command needs {error.name}: {_missing(error.name or '')}", file=sys.stderr)
+            return 2
+        try:
+            return int(options.run(options))
+        except (ValueError, OSError) as error:
+            print(f"vergence {options.command}: {error}", file=sys.stderr)
+            return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+def _missing(module: str) -> str:
+    if module.startswith("vergence_"):
+        return f"the package is not built here, or this shell does not have it ({build_hint()})"
+    return "it is not installed here (vergence doctor says how to install it)"
+
+
+def _options(args: Sequence[str] | None) -> argparse.Namespace:
     arguments = list(sys.argv[1:] if args is None else args)
     parser = argparse.ArgumentParser(prog="vergence", description="Tools of the Vergence binocular head.")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -30,14 +55,7 @@ def main(args: Sequence[str] | None = None) -> int:
             module = importlib.import_module(module_name)
             module.add_arguments(subparser)
             subparser.set_defaults(run=module.run)
-    options = parser.parse_args(arguments)
-    try:
-        return int(options.run(options))
-    except KeyboardInterrupt:
-        return 130
-    except (ValueError, OSError) as error:
-        print(f"vergence {options.command}: {error}", file=sys.stderr)
-        return 2
+    return parser.parse_args(arguments)
 
 
 if __name__ == "__main__":

@@ -158,9 +158,9 @@ class Terminal:
 
 def test_the_whole_dialogue_on_a_terminal(tmp_path: Path):
     path = tmp_path / "servos.yaml"
-    path.write_text("servos:\n  tilt: {channel: 2, model: mg995}\n  pan_left: {channel: 0}\n")
+    path.write_text("servos:\n  tilt: {channel: 2, model: mg995, backend: fake}\n  pan_left: {channel: 0}\n")
     terminal = Terminal("--servos", str(path), "--backend", "fake")
-    terminal.expect("tilt, channel 2, mg995")
+    terminal.expect("tilt, fake channel 2, mg995")
     terminal.expect("c calibrates")
     terminal.press("c")
     terminal.expect("1500.0 us")
@@ -183,7 +183,7 @@ def test_the_whole_dialogue_on_a_terminal(tmp_path: Path):
     terminal.press("0")
     terminal.expect("centre   0       1491.0 us")
     terminal.press("\n")
-    terminal.expect("pan_left, channel 0")
+    terminal.expect("pan_left, fake channel 0")
     terminal.press("\n")
     terminal.expect("write ")
     terminal.press("y\n")
@@ -192,8 +192,21 @@ def test_the_whole_dialogue_on_a_terminal(tmp_path: Path):
     assert terminal.process.returncode == 0
     found = load_servos(path)
     assert found["tilt"].pulse_us(0.0) == pytest.approx(1491)
+    assert (found["tilt"].backend, found["pan_left"].backend) == ("fake", "")
     assert found["pan_left"].channel == 0
     assert len(list(tmp_path.glob("servos.yaml.*.bak"))) == 1
+
+
+def test_a_servo_with_a_backend_of_its_own_needs_no_other(tmp_path: Path):
+    path = tmp_path / "servos.yaml"
+    path.write_text("servos:\n  tilt: {channel: 2, backend: fake}\n  pan_left: {channel: 0}\n")
+    # kernel_pwm, the default, is not opened: there is no such chip here.
+    terminal = Terminal("--servos", str(path), "--joint", "tilt", "--set", "fake.resolution_us=5")
+    terminal.expect("tilt, fake channel 2")
+    terminal.press("\n")
+    terminal.expect("nothing to change")
+    terminal.close()
+    assert terminal.process.returncode == 0
 
 
 def test_saying_no_leaves_the_file(tmp_path: Path):

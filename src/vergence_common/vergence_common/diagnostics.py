@@ -1,5 +1,6 @@
 """A node's health on /diagnostics, once a second, from small functions that each report on one thing."""
 
+import socket
 from collections.abc import Callable
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -14,11 +15,14 @@ PERIOD_S = 1.0
 
 
 class Diagnostics:
-    """Publishes the reports of one node. Names are prefixed by the node's own, as `diagnostic_updater` does."""
+    """Publishes the reports of one node. Names are prefixed by the node's own, as `diagnostic_updater` does.
 
-    def __init__(self, node: Node, hardware_id: str = "none") -> None:
+    `hardware_id` names what the reports are about; empty for the computer that the node runs on.
+    """
+
+    def __init__(self, node: Node, hardware_id: str = "") -> None:
         self._node = node
-        self._hardware_id = hardware_id
+        self._hardware_id = hardware_id or socket.gethostname()
         self._sources: dict[str, Callable[[], Report]] = {}
         self._message, self._statuses = DiagnosticArray(), dict[str, DiagnosticStatus]()
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)

@@ -1,4 +1,4 @@
-"""Boxes beside the other estimators: what they add to a click, when they win, and when they are ignored."""
+"""Boxes of a requested class, alone and beside the tracker that is asked for what they show."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from vergence_gaze.control.controller import GazeController
-from vergence_gaze.estimation.observations import JointResolution, Observation, PointSighting
-from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, Result
+from vergence_gaze.estimation.observations import JointResolution, Observation
+from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, Result, TrackRequest
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.testing.fake_head import FakeHead, VisionModel
 from vergence_rig.rig import default_rig
@@ -19,7 +19,6 @@ from vergence_rig.servo import IDEAL, SG90, ServoSpec
 
 DETECTOR = VisionModel(boxes=True, track=False, box_frame_ticks=30, box_latency_s=0.14, box_noise_px=1.5)
 PLACE = np.array([0.8, 0.1, 0.02])
-BEHIND = 1.5 * PLACE
 
 
 class Run:
@@ -41,6 +40,7 @@ class Run:
         self.outcomes: list[Outcome] = []
         self.errors_deg: list[np.ndarray] = []
         self.commands: list[np.ndarray] = []
+        self.requests: list[TrackRequest] = []
         self.verged: list[bool] = []
         self.until(0.1)
 
@@ -55,6 +55,8 @@ class Run:
             command = self.controller.step(self.head.time_s, [*arrived, *extra(self.head.time_s)])
             arrived = []
             self.head.execute(command)
+            if command.track_request is not None:
+                self.requests.append(command.track_request)
             if command.joints_rad is not None:
                 self.commands.append(command.joints_rad)
             self.report = command.report
@@ -89,29 +91,6 @@ def test_a_slow_detector_is_enough_for_a_class(servo: ServoSpec) -> None:
     assert run.worst_deg(100) < (0.25 if servo is IDEAL else 0.75)
 
 
-@pytest.mark.parametrize("by_class", [True, False])
-def test_boxes_win_over_a_fovea_that_looks_past_a_small_target(by_class: bool) -> None:
-    seeing = replace(DETECTOR, extent_rad=0.02)
-    run = Run(seeing, {"fovea": always(BEHIND)}, parameters={"verged.contrast": "ignored"})
-    run.find() if by_class else run.click()
-    run.until(3.0)
-    assert run.worst_deg(100) < 0.4
-    # without boxes, a click would have ended on what lies behind
-    blind = Run(replace(seeing, boxes=False), {"fovea": always(BEHIND)}, parameters={"verged.contrast": "ignored"})
-    blind.click()
-    blind.until(3.0)
-    assert abs(blind.errors_deg[-1][1]) > 1.0
-
-
-def test_boxes_keep_a_click_beside_their_middle() -> None:
-    beside = PLACE + np.array([0.0, 0.02, 0.01])
-    run = Run(DETECTOR, {"box": always(beside)})
-    run.click()
-    run.until(3.0)
-    assert run.outcomes[0].result is Result.VERGED
-    assert run.worst_deg(100) < 0.45
-
-
 def test_boxes_of_something_else_change_nothing() -> None:
     elsewhere = np.array([0.5, -0.1, 0.0])
     run = Run(replace(DETECTOR, track=True), {"box": always(elsewhere)})
@@ -121,40 +100,28 @@ def test_boxes_of_something_else_change_nothing() -> None:
     assert run.worst_deg(100) < 0.25
 
 
-def test_boxes_say_that_the_tracker_follows_another_object() -> None:
-    seeing = replace(DETECTOR, track=True, extent_rad=0.02, answers_requests=False)
-    run = Run(seeing, {"track": lambda time_s: BEHIND if time_s > 1.0 else None})
-    run.click()
-    run.until(4.0)
-    assert run.worst_deg(150) < 0.4
-
-
-def test_three_that_disagree_hold_the_eyes_still() -> None:
-    seeing = replace(DETECTOR, track=True, extent_rad=0.02, answers_requests=False)
-    wrong = {
-        "track": lambda time_s: BEHIND if time_s > 1.0 else None,
-        "fovea": lambda time_s: 0.55 * PLACE if time_s > 1.0 else None,
-    }
-    run = Run(
-        seeing, wrong, parameters={"verged.contrast_enter": 0.01}
-    )  # so that the goal is still active when they begin to differ
-    run.click()
-    run.until(3.5)
-    assert run.outcomes[0].result is Result.DISAGREEMENT
-    assert "disagree" in run.outcomes[0].reason
-    assert np.ptp(run.commands[-20:], axis=0).max() == 0.0
-
-
 @pytest.mark.parametrize("episode_s", [0.25, 0.8])
-def test_boxes_that_jump_to_a_distractor_do_not_pull_the_eyes(episode_s: float) -> None:
+def test_a_track_that_its_boxes_confirm_outlasts_a_distractor(episode_s: float) -> None:
     nearer = np.array([0.5, -0.12, 0.0])
-    run = Run(DETECTOR, {"box": lambda time_s: nearer if 2.0 < time_s < 2.0 + episode_s else None}, SG90)
+    mistaken = {"box": lambda time_s: nearer if 2.0 < time_s < 2.0 + episode_s else None}
+    run = Run(replace(DETECTOR, track=True), mistaken, SG90)
     run.find()
-    run.until(2.0)
-    assert run.verged[-1]
     run.until(4.0)
     assert run.worst_deg(200) < 0.75
     assert all(run.verged[-200:])
+
+
+def test_a_track_without_a_box_around_it_is_given_up_for_the_boxes() -> None:
+    elsewhere = np.array([0.5, -0.12, 0.0])
+    seeing = replace(DETECTOR, track=True)
+    run = Run(seeing, {"box": lambda time_s: elsewhere if time_s > 2.0 else None})
+    run.find()
+    run.until(2.9)
+    assert run.worst_deg(50) < 0.4
+    assert len(run.requests) == 2  # one that frees the tracker, one for the first boxes
+    wanted = run.head.project(elsewhere, left=True)
+    run.until(3.6)
+    assert run.requests[2].xy == pytest.approx(wanted, abs=0.02)
 
 
 def test_boxes_that_stay_elsewhere_are_followed_in_the_end() -> None:
@@ -163,17 +130,6 @@ def test_boxes_that_stay_elsewhere_are_followed_in_the_end() -> None:
     run.find()
     run.until(5.0)
     assert abs(run.errors_deg[-1][0]) > 10.0
-
-
-def test_boxes_of_a_streamed_point_help() -> None:
-    off = PLACE + np.array([0.0, 0.012, 0.0])
-    run = Run(DETECTOR, {}, SG90)
-    run.until(3.0, lambda time_s: [PointSighting(time_s, tuple(PLACE), math.nan)])
-    assert run.report.verged
-    # a point beside the object is kept, not drawn to the middle of its box
-    run.until(5.0, lambda time_s: [PointSighting(time_s, tuple(off), math.nan)])
-    pans = np.degrees(math.atan2(off[1], off[0]) - math.atan2(PLACE[1], PLACE[0]))
-    assert run.errors_deg[-1][0] == pytest.approx(-pans, abs=0.75)
 
 
 COARSE = SG90.replaced(pulse_step_rad=0.0077)  # a PCA9685 at 50 Hz

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from vergence_gaze.estimation.consistency_monitor import ConsistencyMonitor
 from vergence_gaze.estimation.exposures import Exposures, positive_sigma
 from vergence_gaze.estimation.target_filter import TargetEstimate
 from vergence_gaze.joints.shaft_history import ShaftHistory
@@ -57,30 +56,3 @@ def test_a_turning_eye_knows_its_direction_less_well() -> None:
 
 def test_a_stated_sigma_is_held_to_what_is_sensible() -> None:
     assert [positive_sigma(value, 0.01) for value in (math.nan, -1.0, 0.0, 0.02, 9.0)] == [0.01, 0.01, 0.01, 0.02, 0.5]
-
-
-def differing(monitor: ConsistencyMonitor, pairs: int, from_s: float = 0.0) -> float:
-    for i in range(pairs):
-        stamp_s = from_s + i * PAIR_S
-        monitor.update_track(stamp_s, 0.08, 0.0)
-        monitor.update_fovea(stamp_s, 0.14)
-    return from_s + pairs * PAIR_S
-
-
-@pytest.mark.parametrize(("moving", "lasts_s"), [(False, 10 * PAIR_S), (True, 24 * PAIR_S)])
-def test_of_a_moving_target_estimators_may_differ_for_longer(moving: bool, lasts_s: float) -> None:
-    monitor, pairs = ConsistencyMonitor(0.02), 0
-    while not monitor.disagreement(moving):
-        differing(monitor, 1, pairs * PAIR_S)
-        pairs += 1
-    assert pairs * PAIR_S == pytest.approx(lasts_s)
-
-
-def test_a_disagreement_ends_once_the_fovea_is_silent() -> None:
-    monitor = ConsistencyMonitor(0.02)
-    begin_s = differing(monitor, 40)
-    assert monitor.disagreement(moving=True)
-    for i in range(12):
-        monitor.update_track(begin_s + i * PAIR_S, 0.08, 0.0)
-    assert not monitor.disagreement(moving=False)
-    assert not monitor.differing

@@ -7,7 +7,7 @@ import yaml
 
 from vergence_gaze.law_registry import law_groups, law_names
 from vergence_gaze.parameter_groups import GROUPS, gaze_parameters
-from vergence_gaze.parameters import TargetParameters
+from vergence_gaze.target_parameters import TargetParameters
 from vergence_rig.parameters import ParameterError, renamed
 
 YAML = Path(__file__).resolve().parents[3] / "config" / "gaze_controller_node.yaml"

@@ -11,7 +11,6 @@ from vergence_gaze.estimation.observations import (
     BoxSighting,
     EdgeContrast,
     EyeRotationObservation,
-    FoveaDisparity,
     JointReport,
     JointResolution,
     Observation,
@@ -56,11 +55,13 @@ class Hostile:
             names = [*JOINT_NAMES, "elbow"]
             given = {str(name): v(0.3) for name in self._random.choice(names, self._random.integers(1, 5))}
             return JointReport(stamp, given)
-        if kind == 2:
-            return FoveaDisparity(stamp, skew, v(0.1), v(0.001), abs(v(1.0)), self.flag())
-        if kind == 3:
-            ids = int(self._random.integers(0, 4))
-            return TrackSighting(stamp, skew, ids, v(1.0), v(0.3), v(0.2), v(0.1), v(0.001), v(0.1), self.flag())
+        if kind <= 3:
+            ids, goal = (int(self._random.integers(0, 4)) for _ in range(2))
+            places = v(1.0), v(0.3), v(0.2), v(0.1), v(0.001), v(0.1)
+            candidates = ((v(0.1), 0.5), (v(0.1), 0.4))
+            return TrackSighting(
+                stamp, skew, ids, *places, self.flag(), "", goal, ambiguous=self.flag(), candidates=candidates
+            )
         if kind == 4:
             name = str(self._random.choice(["target", "", "cup"]))
             angles = v(0.4), v(0.3), v(0.4), v(0.3), v(0.1)

@@ -31,9 +31,7 @@ def errors_deg(
 ) -> tuple[np.ndarray, Any]:
     """Let a law verge on a place given by a detector; return the true errors (n, 3) at 100 Hz and the outcomes."""
     rig = default_rig().with_servos(servo)
-    head = FakeHead(
-        rig, lambda time_s: PLACE, vision or VisionModel(boxes=True, track=False), start_rad={"pan_right": 0.06}
-    )
+    head = FakeHead(rig, lambda time_s: PLACE, vision or VisionModel(boxes=True), start_rad={"pan_right": 0.06})
     controller = GazeController(rig, gaze_parameters({"law": law}))
     arrived: list[Any] = []
     errors: list[np.ndarray] = []
@@ -62,7 +60,7 @@ def test_every_law_verges_and_stays(law: str, servo: ServoSpec) -> None:
 
 
 def test_metric_descent_needs_no_signed_disparity() -> None:
-    blind = VisionModel(boxes=True, track=False, fovea=False)
+    blind = VisionModel(boxes=True, track=False)
     errors, outcomes = errors_deg("metric_descent", IDEAL, 6.0, blind)
     assert outcomes[0].result is Result.VERGED
     assert abs(errors[-1][1]) < 0.5

@@ -50,13 +50,6 @@ def test_a_click_asks_for_its_point_in_its_own_image() -> None:
     assert set(requests[1:]) == {None}
 
 
-def test_a_fovea_that_sees_something_else_does_not_pull_the_eyes() -> None:
-    head, controller = clicked(VisionModel(), fovea=lambda time_s: NEARER)
-    done = commands(head, controller, 3.0)
-    assert np.abs(np.degrees(head.true_errors_rad())).max() < 0.25
-    assert not any(command.report.phase.name == "LOST" for command in done[20:])
-
-
 def test_boxes_of_something_else_do_not_pull_the_eyes() -> None:
     head, controller = clicked(VisionModel(boxes=True), box=lambda time_s: NEARER)
     commands(head, controller, 3.0)
@@ -64,7 +57,7 @@ def test_boxes_of_something_else_do_not_pull_the_eyes() -> None:
 
 
 def test_a_track_for_another_goal_is_not_the_target() -> None:
-    head, controller = clicked(VisionModel(fovea=False))
+    head, controller = clicked(VisionModel())
     done = commands(head, controller, 0.4) + commands(head, controller, 2.0, answer_as=7)
     assert "has not found the requested target" in done[-1].report.reason or done[-1].report.phase.name in (
         "LOST",
@@ -83,13 +76,13 @@ def test_a_goal_without_a_pixel_frees_the_tracker(kind: GoalKind) -> None:
 
 
 def test_the_result_is_verged_on_the_point() -> None:
-    head, controller = clicked(VisionModel(fovea=False))
+    head, controller = clicked(VisionModel())
     outcomes = [outcome for command in commands(head, controller, 3.0) for outcome in command.outcomes]
     assert [outcome.result for outcome in outcomes] == [Result.VERGED], outcomes
 
 
 def test_a_target_at_one_of_several_distances_is_not_verged_and_the_result_names_them() -> None:
-    head, controller = clicked(VisionModel(fovea=False))
+    head, controller = clicked(VisionModel())
     outcomes: list[Outcome] = []
     arrived: list[Observation] = []
     ever = False
@@ -114,3 +107,44 @@ def test_a_target_at_one_of_several_distances_is_not_verged_and_the_result_names
     assert [outcome.result for outcome in outcomes] == [Result.AMBIGUOUS], outcomes
     assert "0.81 m, 0.54 m, far away" in outcomes[0].reason
     assert np.abs(np.degrees(head.true_errors_rad())).max() < 0.5, "the eyes look at the likeliest"
+
+
+def test_a_class_asks_for_what_its_boxes_show_in_their_own_image() -> None:
+    head = FakeHead(default_rig(), lambda time_s: PLACE, VisionModel(boxes=True, box_miss_share=0.0), 3)
+    controller = GazeController(default_rig(), gaze_parameters(), 6 * TICK_S)
+    controller.look_at(Goal(GoalKind.CLASS, class_name="target", time_limit_s=60.0), head.time_s)
+    x, y = head.project(PLACE, left=True)
+    done = commands(head, controller, 2.0)
+    freed, *asked = [command.track_request for command in done if command.track_request is not None]
+    assert freed == TrackRequest(0)
+    assert (asked[0].goal_id, asked[0].left_eye, asked[0].extent_rad) == (1, True, (0.1, 0.1))
+    assert asked[0].stamp_s < 0.2
+    assert asked[0].xy == pytest.approx((x, y), abs=0.01)
+    assert len(asked) == 1, "a tracker that shows the target is not asked again"
+    assert np.abs(np.degrees(head.true_errors_rad())).max() < 0.5
+
+
+def test_a_class_that_the_tracker_does_not_show_is_asked_for_again() -> None:
+    head = FakeHead(default_rig(), lambda time_s: PLACE, VisionModel(boxes=True, track=False), 3)
+    controller = GazeController(default_rig(), gaze_parameters(), 6 * TICK_S)
+    controller.look_at(Goal(GoalKind.CLASS, class_name="target", time_limit_s=60.0), head.time_s)
+    asked = [command.track_request for command in commands(head, controller, 3.0) if command.track_request is not None]
+    stamps_s = [request.stamp_s for request in asked if request.goal_id]
+    assert 4 < len(stamps_s) < 10
+    assert np.diff(stamps_s).min() > 0.2
+
+
+def test_without_a_goal_the_tracker_is_asked_for_what_the_left_eye_looks_at() -> None:
+    head = FakeHead(default_rig(), lambda time_s: PLACE, VisionModel(), 3, start_rad={"pan_left": 0.08, "tilt": -0.025})
+    controller = GazeController(default_rig(), gaze_parameters({"start": "verge"}), 6 * TICK_S)
+    done = commands(head, controller, 2.0)
+    asked = [command.track_request for command in done if command.track_request is not None]
+    assert asked[-1].goal_id > 0
+    assert asked[-1].xy == (0.0, 0.0)
+    assert done[-1].report.verged
+
+
+def test_what_the_tracker_loses_without_a_goal_is_not_replaced_while_no_image_arrives() -> None:
+    controller = GazeController(default_rig(), gaze_parameters({"start": "verge"}), 0.02)
+    controller.step(1.0, [JointReport(1.0, dict.fromkeys(JOINT_NAMES, 0.0))])
+    assert all(controller.step(1.0 + 0.02 * i, []).track_request is None for i in range(1, 100))

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from vergence_gaze.control.vergence_judge import VergenceJudge
 from vergence_gaze.estimation.evidence import Gaussian, probability_beyond_limit
-from vergence_gaze.parameters import VergedParameters
+from vergence_gaze.verged_parameters import VergedParameters
 
 LIMIT_RAD = 0.0155
+WRONG_SHARE, WRONG_RANGE_RAD = 0.05, 0.5
 SMALL_RAD = 0.001
 SURE = 1e-4
 GOOD, BAD = 0.4, 0.95
@@ -155,15 +156,22 @@ def test_the_error_probability_is_the_share_that_is_off_after_all() -> None:
     wrong = random.random(count) < 0.05
     seen = np.where(wrong, random.uniform(-0.25, 0.25, count), true + random.normal(0.0, noise, count))
     shown = np.flatnonzero(np.abs(seen) < 0.0085)
-    said = [probability_beyond_limit(Gaussian(expected[i], wide), Gaussian(seen[i], noise), LIMIT_RAD) for i in shown]
+    said = [
+        probability_beyond_limit(
+            Gaussian(expected[i], wide), Gaussian(seen[i], noise), LIMIT_RAD, WRONG_SHARE, WRONG_RANGE_RAD
+        )
+        for i in shown
+    ]
     off = np.count_nonzero(np.abs(true[shown]) > LIMIT_RAD)
     assert off > 30
     assert sum(said) == pytest.approx(off, rel=0.35)
 
 
 def test_without_a_prediction_one_pair_is_not_certain_enough() -> None:
-    alone = probability_beyond_limit(Gaussian(0.0, 1.0), Gaussian(0.0, 0.001), LIMIT_RAD)
-    predicted = probability_beyond_limit(Gaussian(0.0, 0.005), Gaussian(0.0, 0.001), LIMIT_RAD)
+    alone = probability_beyond_limit(Gaussian(0.0, 1.0), Gaussian(0.0, 0.001), LIMIT_RAD, WRONG_SHARE, WRONG_RANGE_RAD)
+    predicted = probability_beyond_limit(
+        Gaussian(0.0, 0.005), Gaussian(0.0, 0.001), LIMIT_RAD, WRONG_SHARE, WRONG_RANGE_RAD
+    )
     assert predicted < VergedParameters().single_pair_error_probability < alone
 
 
@@ -172,7 +180,13 @@ def test_without_a_prediction_one_pair_is_not_certain_enough() -> None:
 def test_the_error_probability_is_a_probability_whatever_comes(
     mean: float, sigma: float, seen: float, noise: float
 ) -> None:
-    assert 0.0 <= probability_beyond_limit(Gaussian(mean, abs(sigma)), Gaussian(seen, abs(noise)), LIMIT_RAD) <= 1.0
+    assert (
+        0.0
+        <= probability_beyond_limit(
+            Gaussian(mean, abs(sigma)), Gaussian(seen, abs(noise)), LIMIT_RAD, WRONG_SHARE, WRONG_RANGE_RAD
+        )
+        <= 1.0
+    )
 
 
 @given(st.floats(-0.1, 0.1), st.floats(1e-4, 0.1))

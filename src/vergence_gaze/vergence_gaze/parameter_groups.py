@@ -13,9 +13,9 @@ from vergence_gaze.parameters import (
     SaccadeParameters,
     SearchParameters,
     ServoParameters,
-    TargetParameters,
-    VergedParameters,
 )
+from vergence_gaze.target_parameters import TargetParameters
+from vergence_gaze.verged_parameters import VergedParameters
 from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError
 
 _FIXED: Groups = (

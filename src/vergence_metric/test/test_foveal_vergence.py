@@ -8,12 +8,13 @@ from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import VergedParameters
 from vergence_rig.parameters import ParameterError
 
-P = VergedParameters(enter_contrast=0.6, leave_contrast=0.72, enter_px=2.0, leave_px=4.0)
+PX = 1.0 / 539.0
+P = VergedParameters(contrast_enter=0.6, contrast_leave=0.72, enter_rad=2.0 * PX, leave_rad=4.0 * PX)
 
 
 def classify(*evidence: tuple[float, float, float]) -> list[bool]:
     classifier = FovealVergenceClassifier(P)
-    return [classifier.update(*each) for each in evidence]
+    return [classifier.update(contrast, PX * error_px, confidence) for contrast, error_px, confidence in evidence]
 
 
 def test_it_takes_low_contrast_and_a_small_confident_error() -> None:
@@ -47,12 +48,12 @@ def test_verged_never_shows_with_high_contrast_or_a_large_confident_error(
 ) -> None:
     classifier = FovealVergenceClassifier(P)
     for contrast, error, confidence in evidence:
-        if classifier.update(contrast, error, confidence):
-            assert contrast <= P.leave_contrast
-            assert confidence < P.min_confidence or abs(error) <= P.leave_px
+        if classifier.update(contrast, PX * error, confidence):
+            assert contrast <= P.contrast_leave
+            assert confidence < P.min_confidence or abs(PX * error) <= P.leave_rad
 
 
-@pytest.mark.parametrize("name", ["leave_contrast", "leave_px"])
+@pytest.mark.parametrize("name", ["contrast_leave", "leave_rad"])
 def test_leaving_below_entering_is_refused(name: str) -> None:
     with pytest.raises(ParameterError, match=name):
-        VergedParameters.from_mapping({name: 0.1})
+        VergedParameters.from_mapping({name: 0.001})

@@ -86,5 +86,5 @@ def test_without_joints_or_a_fitting_camera_there_is_no_track_but_a_reason(
 
 def test_thresholds_of_verged_apply_from_the_next_pair_on(measurement: PairMeasurement, pair: EdgeMetricResult) -> None:
     assert measurement.verged(pair, 1.5, 0.9)
-    change(measurement, "verged", enter_px=1.0)
+    change(measurement, "verged", enter_rad=0.001)
     assert not measurement.verged(pair, 1.5, 0.9)

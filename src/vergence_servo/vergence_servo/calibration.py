@@ -32,6 +32,7 @@ class ServoCalibration(Parameters):
     channel: int = parameter(
         REQUIRED, "channel of the backend, or GPIO number, that the servo is wired to", minimum=0, maximum=63
     )
+    backend: str = parameter("", "servo driver of this servo; empty for the parameter backend of servo_node")
     model: str = parameter("custom", "model of the servo: sg90 and mg995 are presets of speed, dead band and backlash")
     angles_rad: tuple[float, ...] = parameter(
         (-60.0 * _DEG, 60.0 * _DEG), "measured shaft angles, increasing", unit="rad", minimum=-math.pi, maximum=math.pi
@@ -144,10 +145,21 @@ def servos_from_mapping(document: Any) -> dict[str, ServoCalibration]:
             raise ServoCalibrationError(str(error.prefixed(f"servos.{joint}."))) from error
     if not servos:
         raise ServoCalibrationError("servos must have one mapping per joint: got none")
-    channels = [servo.channel for servo in servos.values()]
-    if len(set(channels)) != len(channels):
-        raise ServoCalibrationError(f"each joint must have a different channel: got {channels}")
+    check_channels({name: servo.backend for name, servo in servos.items()}, servos)
     return servos
+
+
+def check_channels(backends: Mapping[str, str], servos: Mapping[str, ServoCalibration]) -> None:
+    """Raise ServoCalibrationError where two of these joints have one channel of one backend (by joint)."""
+    taken: dict[tuple[str, int], str] = {}
+    for name, backend in backends.items():
+        channel = servos[name].channel
+        other = taken.setdefault((backend, channel), name)
+        if other != name:
+            of = f" of backend '{backend}'" if backend else ""
+            raise ServoCalibrationError(
+                f"each joint must have a different channel{of}: got {channel} for {other} and {name}"
+            )
 
 
 def default_servos() -> dict[str, ServoCalibration]:

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from vergence_servo.driver_set import DriverSet
 from vergence_servo.drivers.protocol import DriverIoError
 from vergence_servo.drivers.registry import open_driver
 
@@ -45,6 +46,34 @@ class Guardian:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+
+
+class Guardians:
+    """One guardian for each backend that goes on pulsing when this process dies, so that none waits for another."""
+
+    def __init__(self, drivers: DriverSet, channels: Mapping[str, int]) -> None:
+        """Start them; `channels` are those of the joints. Raises OSError."""
+        self._running: list[Guardian] = []
+        try:
+            for backend, driver in drivers.by_backend.items():
+                if driver.outlives_process:
+                    guarded = [channels[joint] for joint in drivers.joints(backend)]
+                    self._running.append(Guardian(backend, drivers.values[backend], guarded))
+        except BaseException:
+            self.dismiss()
+            raise
+
+    @property
+    def state(self) -> str:
+        """What the diagnostics say: none, running, or ended where one of them has."""
+        if not self._running:
+            return "none"
+        return "running" if all(guardian.alive for guardian in self._running) else "ended"
+
+    def dismiss(self) -> None:
+        """End them without an action, after all servos have been released."""
+        for guardian in self._running:
+            guardian.dismiss()
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -17,7 +17,10 @@ class ServoNodeParameters(HeadParameters):
         "", "path of servos.yaml; empty for the built-in servos, with backend 'fake' only", read_only=True
     )
     backend: str = parameter(
-        "fake", "servo driver, which makes the pulses; 'fake' moves no servo", choices=backend_names, read_only=True
+        "fake",
+        "servo driver of the servos for which servos.yaml names none; 'fake' moves no servo",
+        choices=backend_names,
+        read_only=True,
     )
     joints: tuple[str, ...] = parameter(
         ("pan_left", "pan_right", "tilt"),

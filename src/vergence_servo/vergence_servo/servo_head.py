@@ -75,7 +75,7 @@ class ServoHead:
 
     def __init__(
         self,
-        driver: ServoDriver,
+        driver: ServoDriver | Mapping[str, ServoDriver],
         servos: Mapping[str, ServoLimits],
         parameters: HeadParameters,
         initial_rad: Mapping[str, float],
@@ -85,7 +85,7 @@ class ServoHead:
         """Release all servos.
 
         Args:
-            driver: the backend.
+            driver: the backend, or one for each joint.
             servos: limits by joint; their order is that of `park_rad`.
             parameters: time-outs, starts and parking.
             initial_rad: estimated angles of the joints; 0 for those left out.
@@ -98,12 +98,13 @@ class ServoHead:
             )
         self._parameters = parameters
         retry = retry or RetryParameters()
+        drivers = driver if isinstance(driver, Mapping) else dict.fromkeys(servos, driver)
         self.channels = {
             name: ServoChannel(
                 name,
                 limits,
-                limits.calibration.servo_spec(driver.resolution_us, parameters.command_latency_s),
-                driver,
+                limits.calibration.servo_spec(drivers[name].resolution_us, parameters.command_latency_s),
+                drivers[name],
                 initial_rad.get(name, 0.0),
                 retry,
                 now_s,

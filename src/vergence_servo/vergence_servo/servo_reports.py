@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from vergence_rig.report import ERROR, OK, WARN, Report
-from vergence_servo.drivers.protocol import ServoDriver
-from vergence_servo.guardian import Guardian
+from vergence_servo.driver_set import DriverSet
+from vergence_servo.guardian import Guardians
 from vergence_servo.servo_channel import ChannelState, ServoChannel
 from vergence_servo.servo_head import Mode, ServoHead
 
@@ -33,19 +33,19 @@ class CommandCounts:
         self.last_refused_s, self.last_reason = now_s, f"{topic}: {reason}"
 
 
-def head_report(head: ServoHead, backend: str, driver: ServoDriver, guardian: Guardian | None) -> Report:
+def head_report(head: ServoHead, drivers: DriverSet, guardians: Guardians | None) -> Report:
     """Return the state of the head as a whole."""
     failed = [name for name, channel in head.channels.items() if channel.state is ChannelState.FAILED]
     values = {
         "mode": head.mode.value,
-        "backend": backend,
-        "resolution_us": driver.resolution_us,
-        "outlives_process": driver.outlives_process,
-        "guardian": "none" if guardian is None else "running" if guardian.alive else "ended",
+        "backend": drivers.description(),
+        "resolution_us": ", ".join(f"{driver.resolution_us:.6g}" for driver in drivers.by_backend.values()),
+        "outlives_process": any(driver.outlives_process for driver in drivers.by_backend.values()),
+        "guardian": "none" if guardians is None else guardians.state,
     }
     if failed:
         return Report(ERROR, f"servos failed: {', '.join(failed)}", values)
-    if guardian is not None and not guardian.alive:
+    if values["guardian"] == "ended":
         return Report(
             WARN, "the guardian process has ended: a crash of servo_node would leave the servos pulsing", values
         )

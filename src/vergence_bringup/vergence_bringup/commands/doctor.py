@@ -15,10 +15,18 @@ from pathlib import Path
 from typing import Any
 
 from vergence_bringup.graph_errors import ProcessError
+from vergence_bringup.machine import APT_ROS, build_hint, is_ros_workspace, package_hint, profile_hint
 from vergence_bringup.node_table import NODES
 from vergence_bringup.ros.processes import config_dir, find_node
 from vergence_rig.finding import Finding
+from vergence_rig.install_hint import install_hint
 
+_PACKAGES = {
+    "numpy": ("python3-numpy", "numpy"),
+    "cv2": ("python3-opencv", "opencv-python-headless"),
+    "yaml": ("python3-yaml", "PyYAML"),
+}
+"""Names of the packages that every head needs, in apt and on the package index, by module."""
 _SHM_NEEDED_MB = 64  # two cameras, three readers and slack, in segments of 16 MiB
 
 
@@ -64,10 +72,13 @@ def _python() -> Iterable[Finding]:
     version = ".".join(map(str, sys.version_info[:3]))
     good = (3, 10) <= sys.version_info[:2] <= (3, 14)
     yield Finding("python", good, f"{version} at {sys.executable}", "use Python 3.10 to 3.14: make setup PYTHON=...")
-    wanted = {"numpy": "numpy", "cv2": "opencv-python-headless", "yaml": "PyYAML", "onnxruntime": "onnxruntime"}
-    absent = [package for module, package in wanted.items() if importlib.util.find_spec(module) is None]
-    found = "all installed" if not absent else "missing: " + ", ".join(absent)
-    yield Finding("python packages", not absent, found, f"pip install {' '.join(absent)}, or make setup")
+    for module, (apt, pip) in _PACKAGES.items():
+        found = importlib.util.find_spec(module) is not None
+        yield Finding(f"python package {module}", found, "installed" if found else "missing", package_hint(apt, pip))
+    found = importlib.util.find_spec("onnxruntime") is not None
+    message = "onnxruntime is installed" if found else "onnxruntime is not installed"
+    remedy = f"{install_hint('onnxruntime')}; only box_metric_node needs it"
+    yield Finding("detector", found, message, remedy, needed=False)
 
 
 def _compiler() -> Iterable[Finding]:
@@ -79,9 +90,9 @@ def _compiler() -> Iterable[Finding]:
 
 
 def _ros() -> Iterable[Finding]:
-    where = "apt, /opt/ros/jazzy" if Path("/opt/ros/jazzy").exists() else "wheels in this environment"
+    where = f"apt, {APT_ROS}" if APT_ROS.exists() else "wheels in this environment"
     found = importlib.util.find_spec("rclpy") is not None
-    yield Finding("rclpy", found, where if found else "cannot be imported", "make setup, then source env.sh")
+    yield Finding("rclpy", found, where if found else "cannot be imported", build_hint())
     distro = os.environ.get("ROS_DISTRO", "jazzy")
     yield Finding("ROS distribution", distro == "jazzy", distro, "use ROS 2 Jazzy: this workspace is built for it")
 
@@ -94,19 +105,20 @@ def _nodes() -> Iterable[Finding]:
         except ProcessError as error:
             absent.append(str(error))
     message = f"{len(NODES) - len(absent)} of {len(NODES)} are built" + "".join(f"; {text}" for text in absent)
-    yield Finding("nodes", not absent, message, "make setup, then source env.sh")
+    # A Pi has only what the servos need.
+    needed = len(absent) == len(NODES) or not is_ros_workspace()
+    yield Finding("nodes", not absent, message, build_hint(), needed)
 
 
 def _middleware() -> Iterable[Finding]:
     profile = os.environ.get("FASTRTPS_DEFAULT_PROFILES_FILE")
-    shipped = config_dir() / "fastdds.xml"
-    remedy = f"source env.sh, or export FASTRTPS_DEFAULT_PROFILES_FILE={shipped}"
+    remedy = profile_hint(config_dir() / "fastdds.xml")
     if os.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp") != "rmw_fastrtps_cpp":
         name = os.environ["RMW_IMPLEMENTATION"]
         yield Finding("DDS", True, f"{name} is used: the shipped Fast DDS profile has no effect", needed=False)
     elif profile is None:
         message = "FASTRTPS_DEFAULT_PROFILES_FILE is not set: most raw image pairs will be lost or late"
-        yield Finding("DDS profile", False, message, remedy)
+        yield Finding("DDS profile", False, message, remedy, needed=not is_ros_workspace())
     elif not Path(profile).is_file():
         yield Finding("DDS profile", False, f"no such file: {profile}", remedy)
     else:
@@ -126,11 +138,13 @@ def _shared_memory() -> Iterable[Finding]:
 
 def _rendering(test: bool) -> Iterable[Finding]:
     if importlib.util.find_spec("mujoco") is None:
-        yield Finding("simulator", False, "mujoco is not installed", "pip install mujoco (only sim_node needs it)")
+        remedy = f"{install_hint('mujoco')}; only sim_node needs it"
+        yield Finding("simulator", False, "mujoco is not installed", remedy, needed=not is_ros_workspace())
         return
     library = ctypes.util.find_library("EGL")
     remedy = "apt install libegl1 libgl1-mesa-dri (only sim_node needs it)"
-    yield Finding("libEGL", library is not None, library or "not found", remedy)
+    needed = not is_ros_workspace()
+    yield Finding("libEGL", library is not None, library or "not found", remedy, needed)
     if not test or library is None:
         return
     code = "import mujoco; c = mujoco.GLContext(8, 8); c.make_current(); print(mujoco.__version__)"
@@ -138,7 +152,7 @@ def _rendering(test: bool) -> Iterable[Finding]:
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, timeout=60)
     lines = (result.stdout if result.returncode == 0 else result.stderr).strip().splitlines() or ["no output"]
     message = f"MuJoCo {lines[-1]} renders with MUJOCO_GL={env['MUJOCO_GL']}" if not result.returncode else lines[-1]
-    yield Finding("rendering", result.returncode == 0, message, remedy)
+    yield Finding("rendering", result.returncode == 0, message, remedy, needed)
 
 
 def _groups() -> Iterable[Finding]:

@@ -13,6 +13,7 @@ from vergence_bringup.demo.click_points import click_points
 from vergence_bringup.demo.stations import Station
 from vergence_bringup.figures.pictures import write_image
 from vergence_rig.geometry import EyeAngles
+from vergence_rig.install_hint import install_hint
 from vergence_rig.rig import Rig
 from vergence_sim.photo.matching import matched_disparity
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint, read_pair
@@ -28,8 +29,8 @@ MEASURED, MATCHED, UNKNOWN = "structured light", "semi-global matching", "not kn
 _START_MARGIN_PX = 48.0
 _LEAST_SIDE_PX = 120
 _BORROW = (
-    "--photos without paths shows scikit-image's stereo pair, which is not here ({}): install it (pip install "
-    "scikit-image), or give the paths of both photographs of a rectified pair, LEFT RIGHT"
+    "--photos without paths shows scikit-image's stereo pair, which is not here ({}): install it ({}), "
+    "or give the paths of both photographs of a rectified pair, LEFT RIGHT"
 )
 
 
@@ -151,7 +152,7 @@ def _borrowed(folder: Path, count: int) -> Photographs:
 
         left, right, disparity = stereo_motorcycle()
     except (ImportError, OSError) as error:
-        raise ValueError(_BORROW.format(str(error).splitlines()[0])) from error
+        raise ValueError(_BORROW.format(str(error).splitlines()[0], install_hint("scikit-image"))) from error
     paths = (folder / "left.png").resolve(), (folder / "right.png").resolve()
     for path, image in zip(paths, (left, right), strict=True):
         write_image(path, np.ascontiguousarray(image[:, :, ::-1]))

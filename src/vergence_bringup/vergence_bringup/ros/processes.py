@@ -15,6 +15,7 @@ from typing import IO, Protocol
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix, get_package_share_directory
 
 from vergence_bringup.graph_errors import ProcessError
+from vergence_bringup.machine import build_hint
 from vergence_bringup.node_table import NODES, package_of
 
 _PR_SET_PDEATHSIG = 1
@@ -33,7 +34,7 @@ def find_executable(package: str, executable: str) -> Path:
         path = Path(get_package_prefix(package)) / "lib" / package / executable
     except PackageNotFoundError:
         raise ProcessError(
-            f"package {package!r} is not built, or this shell does not have it: run make setup, then source env.sh"
+            f"package {package!r} is not built, or this shell does not have it: {build_hint()}"
         ) from None
     if not path.exists():
         raise ProcessError(f"executable of {package} must be in {path.parent}: got {executable!r}")

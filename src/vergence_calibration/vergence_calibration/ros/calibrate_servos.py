@@ -21,8 +21,8 @@ from vergence_calibration.servos.jog_session import JogSession
 from vergence_calibration.servos.terminal import NoTerminalError, Terminal
 from vergence_rig.rig import load_rig
 from vergence_servo.calibration import ServoCalibration, ServoCalibrationError, default_servos, load_servos
+from vergence_servo.driver_set import DriverSet, backends_of
 from vergence_servo.drivers.protocol import DriverIoError, ServoDriver
-from vergence_servo.drivers.registry import open_driver
 
 _HELP = "arrows: 10 and 1 us, page keys: 50 us, [ 0 ] a: record, r: release, Enter: done, Esc: discard"
 
@@ -36,13 +36,15 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--joint", action="append", help="calibrate only this joint (repeatable; default: all in the file)"
     )
-    parser.add_argument("--backend", default="kernel_pwm", help="servo driver (default %(default)s)")
+    parser.add_argument(
+        "--backend", default="kernel_pwm", help="driver of the servos that name none in the file (default %(default)s)"
+    )
     parser.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="a parameter of the servo driver, such as address=65",
+        help="a parameter of the servo driver of --backend, such as address=65; of another one: pca9685.address=65",
     )
     parser.add_argument("--yes", action="store_true", help="write without asking")
     parser.add_argument(
@@ -81,20 +83,25 @@ def _by_hand(
     options: argparse.Namespace, old: Mapping[str, ServoCalibration], joints: Sequence[str]
 ) -> dict[str, ServoCalibration]:
     terminal = Terminal()
-    driver = open_driver(options.backend, _backend_values(options.set))
+    settings = _settings(options.set, options.backend)
+    drivers = DriverSet(
+        backends_of(old, joints, options.backend),
+        lambda backend: {key: value for (name, key), value in settings.items() if name == backend.name},
+    )
     fresh = {}
     try:
         with terminal.keys():
             for name in joints:
-                terminal.print_line(f"\n{name}, channel {old[name].channel}, {old[name].model}: {_summary(old[name])}")
+                wired = f"{drivers.backends[name]} channel {old[name].channel}"
+                terminal.print_line(f"\n{name}, {wired}, {old[name].model}: {_summary(old[name])}")
                 terminal.print_line("Enter keeps it, c calibrates it")
                 while (key := terminal.key()) not in ("enter", "c"):
                     continue
-                found = _jog(terminal, driver, old[name]) if key == "c" else None
+                found = _jog(terminal, drivers.by_joint[name], old[name]) if key == "c" else None
                 if found is not None:
                     fresh[name] = found
     finally:
-        driver.close()
+        drivers.close()
     return fresh
 
 
@@ -171,13 +178,14 @@ def _write(options: argparse.Namespace, servos: Mapping[str, ServoCalibration]) 
     return 0
 
 
-def _backend_values(settings: Sequence[str]) -> dict[str, Any]:
+def _settings(settings: Sequence[str], default: str) -> dict[tuple[str, str], Any]:
     values = {}
     for setting in settings:
         name, equals, text = setting.partition("=")
         if not equals:
             raise ServoCalibrationError(f"--set must be KEY=VALUE, a parameter of the servo driver: got {setting!r}")
-        values[name] = yaml.safe_load(text)
+        backend, _, key = name.rpartition(".")
+        values[backend or default, key] = yaml.safe_load(text)
     return values
 
 

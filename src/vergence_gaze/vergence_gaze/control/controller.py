@@ -10,13 +10,12 @@ import numpy.typing as npt
 from vergence_gaze.control.perception import LATEST_FUTURE_S, Perception
 from vergence_gaze.control.report import Command, GazeReport, make_report
 from vergence_gaze.control.search_pattern import Searcher
-from vergence_gaze.estimation.directions import spread_of_eye
+from vergence_gaze.control.track_requests import TrackRequests
 from vergence_gaze.estimation.observations import JointResolution, Observation, PointSighting
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
-from vergence_gaze.goals.goal_resolution import RequestedClass, RequestedPose, resolve_goal
-from vergence_gaze.goals.requested_point import RequestedPoint
+from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, resolve_goal
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.limits import CommandLimits
 from vergence_gaze.joints.resolution import pulse_steps_rad, rig_with_steps
@@ -45,7 +44,6 @@ class GazeController:
         self._limits = CommandLimits(rig)
         self._goals = GoalMonitor()
         self._enabled = True
-        self._track_request: TrackRequest | None = None
         self._pose: Array | None = None
         self._rest = _UNKNOWN
         self._command: Array | None = None
@@ -61,6 +59,7 @@ class GazeController:
         self._driven = _driven(parameters)
         self._perception.configure(parameters, self._driven)
         self._phases = PhaseMachine(parameters)
+        self._requests = TrackRequests(self._perception, parameters)
         self._law = make_law(rig, parameters)
         self._searcher = Searcher(
             rig, parameters.control.tilt_enabled, parameters.target.prior_vergence_rad, parameters.search.dwell_s
@@ -112,22 +111,21 @@ class GazeController:
         self._perception.judge.restart()
         self._law.reset()
         self._searcher.stop()
-        self._track_request = TrackRequest(0)
+        tracking = self._perception.tracking
+        self._requests.free()
         if isinstance(request, RequestedPose):
-            self._perception.tracking.clear()
+            tracking.clear()
             self._pose = np.where(self._driven, request.joints_rad, np.nan)
-        elif isinstance(request, RequestedClass):
-            self._perception.tracking.request_class(now_s, request.class_name)
+        elif isinstance(request, ClassRequest):
+            tracking.request_class(request.class_name, goal_id)
         else:
-            seen = goal.kind in (GoalKind.PIXEL, GoalKind.STEREO_PIXEL)
-            if seen:
-                xy = goal.left_xy if goal.left_eye else goal.right_xy
-                self._track_request = TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy)
-            start = now_s, request.stamp_s, request.angles_rad, request.covariance
+            start = now_s, request.stamp_s, request.angles_rad, request.covariance, goal_id
             if goal.kind is GoalKind.POINT:
-                self._perception.tracking.request_point(*start, goal_id)
+                tracking.request_point(*start)
             else:
-                self._perception.tracking.request_target(*start, goal_id if seen else 0)
+                tracking.request_target(*start)
+                xy = goal.left_xy if goal.left_eye else goal.right_xy
+                self._requests.ask(TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy))
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
 
@@ -154,7 +152,7 @@ class GazeController:
         elif not self._active:
             self._active = self._verges_on_sight = True
             self._perception.tracking.clear()
-            self._track_request = TrackRequest(0)
+            self._requests.free()
 
     def step(self, now_s: float, observations: Iterable[Observation] = ()) -> Command:
         """Update by what arrived since the last cycle and return what to command now.
@@ -182,8 +180,8 @@ class GazeController:
         if sending:
             self._perception.history.on_command(now_s)
         self._update_goal(now_s)
-        request, self._track_request = self._track_request, None
-        return Command(sent if sending else None, self._report(now_s), self._goals.pop_outcomes(), request)
+        joints_rad = sent if sending else None
+        return Command(joints_rad, self._report(now_s), self._goals.pop_outcomes(), self._requests.pop())
 
     def _observe(self, observation: Observation, now_s: float) -> None:
         if isinstance(observation, JointResolution):
@@ -204,8 +202,8 @@ class GazeController:
 
     def _follow_stream(self, now_s: float) -> None:
         if not self._perception.tracking.follows_stream:
-            self._perception.tracking.request_stream(now_s)
-            self._track_request = TrackRequest(0)
+            self._perception.tracking.request_stream()
+            self._requests.free()
             self._perception.judge.restart("the target is a stream of points")
             self._active, self._pose, self._verges_on_sight = True, None, False
 
@@ -214,12 +212,13 @@ class GazeController:
         if self._pose is not None:
             self._phases.enter(Phase.SACCADE, "turning to the requested angles", now_s)
             return self._pose
-        if self._verges_on_sight and not self._perception.tracking.filter.initialised:
-            self._verge_on_view(now_s)
+        unseen = not self._perception.unseen_s(now_s) <= self._p.target.lost_after_s
+        if self._verges_on_sight and unseen and self._requests.ask_for_view(self._goals.new_id(), now_s):
+            self._phases.enter(Phase.VERGE, "no goal: verging on what the left eye looks at", now_s)
         situation = self._situation(self._control_input(now_s, command))
         phase = self._phases.update(situation)
-        if self._perception.tracking.point is not None:
-            self._look_at_point(self._perception.tracking.point, situation)
+        resting = situation.eyes_still and situation.residual_rad <= self._p.saccade.threshold_rad
+        self._requests.ask_at_point(resting, now_s)
         if phase is Phase.SEARCH:
             place = self._searcher.next_pose(now_s, self._perception.history.shaft_rad, self._limits.speed_rad_s)
             return np.where(self._driven, place, np.nan)
@@ -229,26 +228,7 @@ class GazeController:
             return _UNKNOWN
         if phase is Phase.SACCADE and self._perception.judge.verged:
             self._perception.judge.restart("a saccade to the target is under way")
-        if self._perception.tracking.disagreement:
-            self._phases.enter(Phase.VERGE, "estimators of the target's vergence disagree: holding still", now_s)
-            return _UNKNOWN
         return self._law.compute_command(self._control_input(now_s, command))
-
-    def _look_at_point(self, point: RequestedPoint, s: Situation) -> None:
-        history, exposure_s = self._perception.history, self._perception.exposure_s
-        seen = history.covers(exposure_s) and self._perception.tracking.eyes_were_still(exposure_s, 0.0)
-        joints_rad = history.shaft_at(exposure_s) if seen else _UNKNOWN
-        resting = s.eyes_still and s.residual_rad <= self._p.saccade.threshold_rad
-        request = point.request(resting, s.now_s, exposure_s if seen else math.nan, joints_rad)
-        self._track_request = request or self._track_request
-
-    def _verge_on_view(self, now_s: float) -> None:
-        self._phases.enter(Phase.VERGE, "no goal: verging on what the left eye looks at", now_s)
-        left, right, tilt = self._perception.history.shaft_rad
-        spread = spread_of_eye(True, self._p.target.direction_sigma_rad, self._p.target.prior_vergence_sigma_rad)
-        self._perception.tracking.request_target(
-            now_s, now_s, np.array([0.5 * (left + right), right - left, tilt]), spread
-        )
 
     def _control_input(self, now_s: float, command: Array) -> ControlInput:
         return ControlInput(
@@ -306,7 +286,6 @@ class GazeController:
             in_phase_s=now_s - self._phases.since_s,
             image_s=self._perception.image_s,
             beyond_limits=self._beyond_limits,
-            disagreement=self._perception.tracking.disagreement,
             by_class=self._perception.tracking.class_name is not None,
             pose_reached=pose_reached,
             ambiguity=self._perception.tracking.ambiguity,

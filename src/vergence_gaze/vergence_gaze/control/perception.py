@@ -12,7 +12,6 @@ from vergence_gaze.estimation.observations import (
     BoxSighting,
     EdgeContrast,
     EyeRotationObservation,
-    FoveaDisparity,
     JointReport,
     Observation,
     PointSighting,
@@ -33,13 +32,9 @@ Array = npt.NDArray[np.float64]
 Driven = npt.NDArray[np.bool_]
 
 LATEST_FUTURE_S = 1.0
-_STEADY_VERGENCE_RAD = 0.005
-_SWEEPING_RAD_S = 0.6
-_STILL_SPEED_RAD_S = 0.2
-_ARRIVED_RAD = 0.004
-_COMMANDED_AHEAD_S = 0.03
-_OFF_PROBABILITY_MOVING = 0.3
-_IDENTIFIED_WITHIN_S = 1.0
+_STILL_SPEED_RAD_S = 0.2  # joints that report less are at rest
+_ARRIVED_RAD = 0.004  # joints this near to a command are where it sent them
+_COMMANDED_AHEAD_S = 0.03  # while a target is followed, the command is ahead of the report by its way in this time
 _NO_PREDICTION = Gaussian(0.0, math.inf)
 
 
@@ -90,7 +85,7 @@ class Perception:
             if self.history.add(observation.stamp_s, observation.positions_rad) and self._moves.update():
                 self.vergence_offset.on_pan_moved(observation.stamp_s)
             return
-        if not self.history.known or not observation.stamp_s <= now_s + LATEST_FUTURE_S:
+        if not (self.history.known and observation.stamp_s <= now_s + LATEST_FUTURE_S < math.inf):
             return
         if isinstance(observation, EyeRotationObservation):
             self._update_rotation(observation)
@@ -155,9 +150,7 @@ class Perception:
             return self.tracking.update_point(observation, now_s)
         if isinstance(observation, TrackSighting):
             return self.tracking.update_track(observation, now_s)
-        if isinstance(observation, BoxSighting):
-            return self.tracking.update_box(observation, now_s)
-        return isinstance(observation, FoveaDisparity) and self.tracking.update_fovea(observation, now_s)
+        return isinstance(observation, BoxSighting) and self.tracking.update_box(observation, now_s)
 
     def _update_rotation(self, seen: EyeRotationObservation) -> None:
         if seen.usable and self.tracking.eyes_were_still(seen.stamp_s, seen.skew_s):
@@ -204,33 +197,33 @@ class Perception:
         judged = [i for i in (range(3) if self._driven[:2].all() else (2,)) if self._driven[i]]
         measured = [abs(float(errors[i])) for i in judged]
         vergence_error = estimate.vergence_rad - float(joints[1] - joints[0])
-        # The fovea's vergence is measured from the left eye's own axis, wherever the target is beside it.
-        left_error = 0.0 if self.tracking.source == "fovea" else visual.error_rad[0]
-        seen_error = 0.0 if by_point else float(visual.error_rad[1] - left_error)
+        seen_error = 0.0 if by_point else float(visual.error_rad[1] - visual.error_rad[0])
         error = max(abs(vergence_error), abs(seen_error) if math.isfinite(seen_error) else 0.0)
         direction_error = max((value for value in measured if math.isfinite(value)), default=0.0)
         # Eyes that sweep across the target are not verged on it; eyes that turn along with it are.
         along = float(np.abs(estimate.rates_rad_s).max()) if estimate.moving else 0.0
-        sweeping = self.history.speed_within(stamp_s - self._p.exposure.settle_s, stamp_s) > along + _SWEEPING_RAD_S
-        certain = float(estimate.sigmas_rad[1]) < _STEADY_VERGENCE_RAD
-        if self.tracking.source != "fovea":
-            self.judge.update_target(stamp_s, error, direction_error)
+        sweeping = (
+            self.history.speed_within(stamp_s - self._p.exposure.settle_s, stamp_s) > along + self._p.verged.sweep_rad_s
+        )
+        certain = float(estimate.sigmas_rad[1]) < self._p.verged.steady_rad
+        self.judge.update_target(stamp_s, error, direction_error)
         # Eyes that passed over the target at the exposure are elsewhere by now; eyes that were on it for long stay.
         on_target = self._on_target(now_s) or self.judge.long_on_target(now_s)
         # Since the exposure a correction may have begun: until it has ended, one eye is ahead of the other.
         turned_rad = np.abs(self.history.reported_rad - self.history.reported_at(stamp_s))
         correcting = not along and bool(turned_rad.max() > self.judge.enter_rad)
-        steady = certain and on_target and not sweeping and not correcting and not self.tracking.differing
+        steady = certain and on_target and not sweeping and not correcting
         probability = 1.0
         # A target that moves, or may move, can be elsewhere by now: there one pair is never enough.
         if self.tracking.filter.surely_at_rest and not by_point and math.isfinite(visual.error_rad[1]):
             limit, off, sigmas = self._p.verged.leave_rad, estimate.joints_rad - joints, estimate.joint_sigmas_rad
             measured_error = Gaussian(vergence_error, float(estimate.sigmas_rad[1]))
-            probability = probability_beyond_limit(self._predicted_error, measured_error, limit)
+            p = self._p.verged
+            probability = probability_beyond_limit(
+                self._predicted_error, measured_error, limit, p.wrong_share, p.wrong_range_rad
+            )
             probability += sum(Gaussian(float(off[i]), float(sigmas[i])).probability_beyond(limit) for i in judged)
         objection = self.tracking.ambiguity
-        if self.tracking.source == "fovea" and self.tracking.unidentified_for_s(now_s) >= _IDENTIFIED_WITHIN_S:
-            objection = "an object at the target's depth lies at the fovea, but the target was not seen for long"
         self.judge.update_pair(stamp_s, now_s, error, steady, verging, probability, direction_error, objection)
 
     def _on_target(self, now_s: float) -> bool:
@@ -248,4 +241,4 @@ class Perception:
         beyond = sum(
             Gaussian(float(off[i]), float(sigmas[i])).probability_beyond(limit) for i in np.flatnonzero(judged)
         )
-        return not estimate.moving or beyond < _OFF_PROBABILITY_MOVING
+        return not estimate.moving or beyond < self._p.verged.moving_error_probability

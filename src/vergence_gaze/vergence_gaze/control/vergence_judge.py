@@ -3,13 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from vergence_gaze.parameters import VergedParameters
+from vergence_gaze.verged_parameters import VergedParameters
+from vergence_rig.verged import objection
 
-_CONTRAST_AGE_S = 0.5
-_SEEN_AGE_S = 1.0
-_PAIR_MATCH_S = 0.08
-_SAME_PAIR_S = 0.012
-_LONG_ON_TARGET_S, _SEEN_LATELY_S = 0.4, 0.4
+_SAME_PAIR_S = 0.012  # stamps of one pair, from two nodes, differ by less
 
 
 @dataclass(frozen=True)
@@ -90,15 +87,15 @@ class VergenceJudge:
 
     def long_on_target(self, now_s: float) -> bool:
         """Return whether the identified target was on the axes in every pair for a while, up to now."""
-        lately = now_s - self._target_s < _SEEN_LATELY_S
-        return lately and self._target_s - self._on_target_since_s >= _LONG_ON_TARGET_S
+        lately = now_s - self._target_s < self._p.followed_s
+        return lately and self._target_s - self._on_target_since_s >= self._p.followed_s
 
     def exposure_for(self, stamp_s: float, now_s: float) -> float:
         """Return the time at which a streamed point is judged: that of the newest image that counts; points are newer.
 
         So each image gives one verdict, however late it is.
         """
-        counts = self._p.contrast != "ignored" and now_s - self._contrast_s <= _SEEN_AGE_S
+        counts = self._p.contrast != "ignored" and now_s - self._contrast_s <= self._p.contrast_lost_s
         return min(stamp_s, self._contrast_s) if counts else stamp_s
 
     def update_pair(
@@ -116,7 +113,7 @@ class VergenceJudge:
 
         Args:
             stamp_s: the pair's stamp; every pair counts once, by its last measurement until `verged` is set, and by its
-                worst from then on: the fovea measures no direction.
+                worst from then on.
             now_s: the present.
             vergence_error_rad: the vergence error in that pair.
             steady: whether the estimate is certain enough.
@@ -141,7 +138,7 @@ class VergenceJudge:
         return self.verged
 
     def _enter(self, pair: PairEvidence, now_s: float) -> None:
-        good = self._within(pair, now_s, (self.enter_rad, self.direction_enter_rad), self._p.contrast_enter)
+        good = self._within(pair, now_s, (self.enter_rad, self.direction_enter_rad))
         if good and not (pair.steady and pair.resting):
             good, self.reason = False, "the target's estimate is not certain yet, or the eyes move"
         self._good = self._good_before + 1 if good else 0
@@ -152,40 +149,35 @@ class VergenceJudge:
             self.verged, self.since_s, self._bad, self._bad_before = True, now_s, 0, 0
 
     def _stay(self, pair: PairEvidence, now_s: float) -> None:
-        good = self._within(pair, now_s, (self._p.leave_rad,) * 2, self._p.contrast_leave)
+        good = self._within(pair, now_s, (self._p.leave_rad,) * 2)
         self._bad = 0 if good else self._bad_before + 1
         if self._bad >= self._p.leave_pairs:
             self.verged, self.since_s, self._good = False, math.nan, 0
 
-    def _within(self, pair: PairEvidence, now_s: float, limits_rad: tuple[float, float], contrast_limit: float) -> bool:
-        if pair.objection:
-            self.reason = pair.objection
-            return False
-        errors_rad = {"vergence": pair.vergence_error_rad, "direction": pair.direction_error_rad}
-        for (kind, error_rad), limit_rad in zip(errors_rad.items(), limits_rad, strict=True):
-            if not abs(error_rad) <= limit_rad:
-                self.reason = f"{kind} error {math.degrees(abs(error_rad)):.2f} deg"
-                return False
-        objection = self._contrast_objection(pair.stamp_s, now_s, contrast_limit)
-        self.reason = objection or "contrast, signed error and certainty of the estimate agree"
-        return not objection
+    def _within(self, pair: PairEvidence, now_s: float, limits_rad: tuple[float, float]) -> bool:
+        errors = [
+            ("vergence", pair.vergence_error_rad, limits_rad[0]),
+            ("direction", pair.direction_error_rad, limits_rad[1]),
+        ]
+        contrast, limit = self.contrast if self._uses_contrast(now_s) else math.nan, self._p.contrast_limit(self.verged)
+        doubt = pair.objection or self._missing_contrast(pair.stamp_s, now_s) or objection(contrast, limit, errors)
+        self.reason = doubt or "contrast, signed error and certainty of the estimate agree"
+        return not doubt
 
     def _is_own_contrast(self, pair: PairEvidence) -> bool:
         return abs(pair.stamp_s - self._contrast_s) <= _SAME_PAIR_S
 
     def _uses_contrast(self, now_s: float) -> bool:
         if self._p.contrast == "when_seen":
-            return now_s - self._contrast_s <= _SEEN_AGE_S
+            return now_s - self._contrast_s <= self._p.contrast_lost_s
         return self._p.contrast == "required"
 
-    def _contrast_objection(self, stamp_s: float, now_s: float, limit: float) -> str:
-        """Return why the contrast prevents `verged`; empty if it does not."""
+    def _missing_contrast(self, stamp_s: float, now_s: float) -> str:
+        """Return why there is no contrast to judge a pair by; empty if there is, or if none is used."""
         if not self._uses_contrast(now_s):
             return ""
-        if now_s - self._contrast_s > _SEEN_AGE_S:
+        if now_s - self._contrast_s > self._p.contrast_lost_s:
             return "no edge contrast arrives"
-        if stamp_s - self._contrast_s > _PAIR_MATCH_S + (_CONTRAST_AGE_S if self.verged else 0.0):
+        if not self.verged and stamp_s - self._contrast_s > self._p.contrast_age_s:
             return "the newest edge contrast is older than the disparity"
-        if self.contrast <= limit:
-            return ""
-        return f"edge contrast {self.contrast:.2f} above {limit:.2f}"
+        return ""

@@ -89,18 +89,6 @@ def both_eyes(
     return Measurement(rows, values, np.array([sigma_rad, right_sigma, sigma_rad]), stamps), (left_pan, right_pan, tilt)
 
 
-def fovea_vergence(
-    history: ShaftHistory, stamp_s: float, skew_s: float, disparity_rad: float, sigma_rad: float
-) -> Measurement:
-    """Return the measurement of the vergence that fixates what lies at the left fovea."""
-    at_left, at_right = _joints(history, stamp_s), _joints(history, stamp_s + skew_s)
-    if not abs(disparity_rad) < 1.5:
-        raise SightingError(f"the disparity must be less than 1.5 rad: got {disparity_rad:g}")
-    right_pan, _ = direction_angles(at_right[1], at_right[2], math.tan(-disparity_rad), 0.0)
-    value = right_pan - float(at_left[0])
-    return Measurement(np.array([_VERGENCE]), np.array([value]), np.array([sigma_rad]), np.array([stamp_s]))
-
-
 def point(
     history: ShaftHistory, stamp_s: float, point_m: tuple[float, float, float], baseline_m: float, sigma_rad: float
 ) -> Measurement:
@@ -133,31 +121,50 @@ def track(
 
 
 def box(
-    history: ShaftHistory, sighting: BoxSighting, sigma_rad: float, disparity_sigma_rad: float = 0.0
+    history: ShaftHistory, sighting: BoxSighting, sigma_rad: float, right_rate_rad_s: float
 ) -> tuple[Measurement, Array]:
     """Return the measurement of a detected target, and its (left pan, right pan, tilt) (3,) [rad], NaN where unseen.
 
-    The disparity of the surface inside the boxes, where there is one, is better than that of their centres.
+    The disparity of the surface inside the boxes, where there is one, gives the vergence: it is more precise than the
+    middles of two boxes. `right_rate_rad_s` is how fast the right eye's pan to the target changes between the two
+    exposures.
     """
     left_xy = (_tangent(sighting.left_azimuth_rad), _tangent(sighting.left_elevation_rad))
     right_xy = (_tangent(sighting.right_azimuth_rad), _tangent(sighting.right_elevation_rad))
     if math.isfinite(left_xy[0]) and math.isfinite(right_xy[0]):
-        disparity = sighting.surface_disparity_rad
-        right_x = _tangent(sighting.left_azimuth_rad - disparity) if math.isfinite(disparity) else right_xy[0]
-        measurement, both = both_eyes(
-            history, sighting.stamp_s, sighting.skew_s, left_xy, right_x, sigma_rad, disparity_sigma_rad
-        )
-        return measurement, np.array(both)
+        disparity_rad = sighting.surface_disparity_rad
+        refined = math.isfinite(disparity_rad) and sighting.surface_sigma_rad > 0.0
+        right_x = _tangent(sighting.left_azimuth_rad - disparity_rad) if refined else right_xy[0]
+        measurement, both = both_eyes(history, sighting.stamp_s, sighting.skew_s, left_xy, right_x, sigma_rad, 0.0)
+        seen_rad = np.array(both)
+        if refined:
+            vergence_rad = both[1] - both[0] - right_rate_rad_s * sighting.skew_s
+            measurement = Measurement(
+                np.array([_LEFT_PAN, _VERGENCE, _TILT]),
+                np.array([both[0], vergence_rad, both[2]]),
+                np.array([sigma_rad, sighting.surface_sigma_rad, sigma_rad]),
+                np.full(3, sighting.stamp_s),
+            )
+        return measurement, seen_rad
     in_left = math.isfinite(left_xy[0])
     stamp_s = sighting.stamp_s + (0.0 if in_left else sighting.skew_s)
     measurement, (pan, tilt) = one_eye(history, in_left, stamp_s, *(left_xy if in_left else right_xy), sigma_rad)
     return measurement, np.array([pan if in_left else math.nan, math.nan if in_left else pan, tilt])
 
 
-def shifted(measurement: Measurement, pan_rad: float, tilt_rad: float) -> Measurement:
-    """Return the measurement of a point this far beside the one that was seen, at the same depth [rad]."""
-    by = np.where(measurement.coefficients[:, 2] != 0, tilt_rad, pan_rad)
-    return replace(measurement, values=measurement.values + by)
+def shifted(measurement: Measurement, seen_rad: Array, beside_rad: Array) -> tuple[Measurement, Array]:
+    """Return the measurement and place (3,) of a point this far beside in pan and tilt (2,), at the same depth."""
+    pan, tilt = (float(angle) for angle in beside_rad)
+    by = np.where(measurement.coefficients[:, 2] != 0, tilt, np.where(measurement.coefficients[:, 0] != 0, pan, 0.0))
+    return replace(measurement, values=measurement.values + by), seen_rad + np.array([pan, pan, tilt])
+
+
+def without_depth(measurement: Measurement, seen_rad: Array) -> tuple[Measurement, Array]:
+    """Return what one pair shows of a direction alone: a measurement and place without the right eye's pan."""
+    kept = [tuple(row) in (_LEFT_PAN, _TILT) for row in measurement.coefficients]
+    m = measurement
+    left = Measurement(m.coefficients[kept], m.values[kept], m.sigmas[kept], m.stamps_s[kept])
+    return left, np.where([False, True, False], math.nan, seen_rad)
 
 
 def _tangent(angle_rad: float) -> float:

@@ -3,11 +3,6 @@
 import math
 from dataclasses import dataclass
 
-_WRONG_SHARE = 0.05
-"""Prior probability that a disparity is of another object, in cluttered views."""
-_WRONG_RANGE_RAD = 0.5
-"""Range over which such a disparity is uniform: three hundred pixels of search."""
-
 
 @dataclass(frozen=True)
 class Gaussian:
@@ -25,7 +20,9 @@ class Gaussian:
         return min(0.5 * (math.erfc(above / scale) + math.erfc(below / scale)), 1.0)
 
 
-def probability_beyond_limit(predicted: Gaussian, measured: Gaussian, limit_rad: float) -> float:
+def probability_beyond_limit(
+    predicted: Gaussian, measured: Gaussian, limit_rad: float, wrong_share: float, wrong_range_rad: float
+) -> float:
     """Return the probability that an error is beyond a limit although a pair shows it within.
 
     The pair may be right and noisy, or of another object. The better it agrees with the prediction, the less likely it
@@ -35,13 +32,15 @@ def probability_beyond_limit(predicted: Gaussian, measured: Gaussian, limit_rad:
         predicted: the error predicted from earlier images and the servos' model.
         measured: the error measured in the pair.
         limit_rad: the largest error allowed.
+        wrong_share: share of the pairs that are of another object.
+        wrong_range_rad: range over which such a pair's error is uniform.
     """
     spread = math.hypot(predicted.sigma_rad, measured.sigma_rad)
     off = (measured.mean_rad - predicted.mean_rad) / max(spread, 1e-9)
     if not (math.isfinite(spread) and math.isfinite(off)):
         return 1.0
-    right = (1.0 - _WRONG_SHARE) * math.exp(-0.5 * min(off * off, 1e3)) / (math.sqrt(math.tau) * max(spread, 1e-9))
-    wrong = _WRONG_SHARE / _WRONG_RANGE_RAD
+    right = (1.0 - wrong_share) * math.exp(-0.5 * min(off * off, 1e3)) / (math.sqrt(math.tau) * max(spread, 1e-9))
+    wrong = wrong_share / wrong_range_rad
     return min(
         wrong / (wrong + right) * predicted.probability_beyond(limit_rad) + measured.probability_beyond(limit_rad), 1.0
     )

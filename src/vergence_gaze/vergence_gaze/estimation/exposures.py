@@ -48,13 +48,6 @@ class Exposures:
         speed = self._history.speed_within(first - _REPORT_S, last + 0.001)
         return math.hypot(positive_sigma(sigma_rad, self._p.target.direction_sigma_rad), _TIMING_SIGMA_S * speed)
 
-    def at_fovea(self, stamp_s: float, target: TargetEstimate | None) -> bool:
-        """Return whether the target was at the left fovea."""
-        if target is None:
-            return False
-        joints, target_rad = self._history.shaft_at(stamp_s), target.joints_rad
-        return math.hypot(target_rad[0] - joints[0], target_rad[2] - joints[2]) <= self._p.target.fovea_radius_rad
-
 
 def positive_sigma(sigma_rad: float, fallback_rad: float) -> float:
     """Return a stated standard deviation within sensible bounds; `fallback_rad` if it is not a positive number."""

@@ -1,9 +1,10 @@
-"""The controller's inputs: joints, disparities, tracks, boxes, points. Times are seconds of one clock.
+"""The controller's inputs: joints, tracks, boxes, points, contrasts. Times are seconds of one clock.
 
 Normalised image coordinates are undistorted x/z, y/z in the eye's optical frame (x right, y down). Values that are not
 known are NaN.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -23,19 +24,6 @@ class JointResolution:
 
     stamp_s: float
     steps_rad: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class FoveaDisparity:
-    """Signed disparity at the left image's centre, atan(x_left) - atan(x_right) [rad]; `usable` if it was measured."""
-
-    stamp_s: float
-    skew_s: float
-    horizontal_rad: float
-    sigma_rad: float
-    confidence: float
-    usable: bool
-    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -67,9 +55,9 @@ class TrackSighting:
 class BoxSighting:
     """The detected target: its direction in each eye [rad] (right positive, down positive), NaN where unseen.
 
-    `surface_disparity_rad` is the refined disparity of the surface inside the boxes, NaN if not refined;
-    `extent_rad` is the angular width of the left box; `whole` is False for boxes cut by the border or partly hidden,
-    whose centres are not the object's.
+    `surface_disparity_rad` is the refined disparity of the surface inside the boxes, `surface_sigma_rad` its standard
+    deviation, NaN if not refined; `extent_rad` and `extent_height_rad` are the angular width and height of the left
+    box; `whole` is False for boxes cut by the border or partly hidden, whose centres are not the object's.
     """
 
     stamp_s: float
@@ -85,6 +73,8 @@ class BoxSighting:
     usable: bool
     reason: str = ""
     whole: bool = True
+    extent_height_rad: float = math.nan
+    surface_sigma_rad: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -121,12 +111,5 @@ class EyeRotationObservation:
 
 
 Observation: TypeAlias = (
-    JointReport
-    | JointResolution
-    | FoveaDisparity
-    | TrackSighting
-    | BoxSighting
-    | PointSighting
-    | EdgeContrast
-    | EyeRotationObservation
+    JointReport | JointResolution | TrackSighting | BoxSighting | PointSighting | EdgeContrast | EyeRotationObservation
 )

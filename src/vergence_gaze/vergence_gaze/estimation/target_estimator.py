@@ -1,7 +1,6 @@
 """The estimate of the target: the filter, the newest measurement that updated it, and its source."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -36,8 +35,6 @@ class TargetEstimator:
         self.filter.clear()
         self.visual: VisualError | None = None
         self.seen_s = math.nan
-        self.identified_s = -math.inf
-        """When the target was last measured by another source than the fovea, which measures whatever lies there."""
         self.source = ""
         self.note = ""
 
@@ -49,10 +46,6 @@ class TargetEstimator:
         """Return how fast each joint (3,) turns while it follows the target; 0 while none moves."""
         estimate = self.estimate(time_s)
         return estimate.joint_rates_rad_s if estimate is not None and estimate.moving else np.zeros(3)
-
-    def unidentified_for_s(self, now_s: float) -> float:
-        """Return for how long only the fovea has measured a target identified before; 0 if it never was."""
-        return now_s - self.identified_s if math.isfinite(self.identified_s) else 0.0
 
     def initialise_from(self, measurement: Measurement) -> None:
         """Start the filter at a first measurement, with the prior vergence while only one eye sees the target."""
@@ -67,15 +60,7 @@ class TargetEstimator:
         for variances in self._moves.pop_before(stamp_s):
             self.filter.inflate_covariance(variances)
 
-    def update(
-        self,
-        measurement: Measurement,
-        seen_rad: Array,
-        skew_s: float,
-        now_s: float,
-        source: str,
-        may_jump: Callable[[], bool] = lambda: True,
-    ) -> bool:
+    def update(self, measurement: Measurement, seen_rad: Array, skew_s: float, now_s: float, source: str) -> bool:
         """Update the estimate by a measurement; returns False, with the reason in `note`, if it was rejected.
 
         Args:
@@ -84,18 +69,11 @@ class TargetEstimator:
             skew_s: how much later the right eye's image was exposed.
             now_s: the present.
             source: the estimator that measured it.
-            may_jump: called only for a measurement outside the gate: whether the target may have jumped there.
         """
-        self.inflate_for_joint_motion(measurement.stamp_s)
-        if not (self.filter.update(measurement) or (may_jump() and self.filter.accept_jump(measurement))):
+        if not (self.filter.update(measurement) or self.filter.accept_jump(measurement)):
             off_deg = math.degrees(self.filter.last_innovation_rad)
             self.note = f"{source} measurement is {off_deg:.1f} deg off the predicted target"
             return False
-        if source == "fovea":
-            # The fovea measures only the depth; the direction is the estimate's.
-            seen_rad = np.where(np.isnan(seen_rad), self.filter.at(measurement.stamp_s).joints_rad, seen_rad)
-        else:
-            self.identified_s = now_s
         at_left = self._history.shaft_at(measurement.stamp_s)
         at_right = self._history.shaft_at(measurement.stamp_s + skew_s)
         error_rad = seen_rad - np.array([at_left[0], at_right[1], at_left[2]])

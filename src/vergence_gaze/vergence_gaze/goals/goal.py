@@ -24,7 +24,6 @@ class Result(enum.IntEnum):
     LOST = 2
     LIMITS = 3
     NO_IMAGES = 4
-    DISAGREEMENT = 5
     PREEMPTED = 6
     CANCELLED = 7
     TIMED_OUT = 8
@@ -59,13 +58,15 @@ class Goal:
 class TrackRequest:
     """What the tracker is to follow for a goal: a point (x, y) of one eye's image, in normalised coordinates.
 
-    `goal_id` 0 asks for no point: the tracker is free to follow what lies at the fovea.
+    `extent_rad` are the angular width and height of the object there, NaN if unknown. `goal_id` 0 asks for no point:
+    the tracker is free to follow what lies at the fovea.
     """
 
     goal_id: int
     stamp_s: float = math.nan
     left_eye: bool = True
     xy: tuple[float, float] = (math.nan, math.nan)
+    extent_rad: tuple[float, float] = (math.nan, math.nan)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from vergence_gaze.phases import Phase
 
 _LIMITED_S = 0.5
 _LOST_S = 2.5
-_DISAGREED_S = 1.0
 _AMBIGUOUS_S = 3.0
 
 
@@ -31,7 +30,6 @@ class Progress:
     in_phase_s: float
     image_s: float
     beyond_limits: bool
-    disagreement: bool
     by_class: bool
     pose_reached: bool | None
     at_point: str = ""
@@ -46,7 +44,7 @@ class GoalMonitor:
         self._outcomes: list[Outcome] = []
         self._goal_id: int | None = None
         self._since_s = self._limit_s = math.nan
-        self._limited_since_s = self._disagreed_since_s = self._ambiguous_since_s = math.nan
+        self._limited_since_s = self._ambiguous_since_s = math.nan
 
     @property
     def goal_id(self) -> int | None:
@@ -65,7 +63,7 @@ class GoalMonitor:
         """Make a goal the active one."""
         self._goal_id, self._since_s = goal_id, now_s
         self._limit_s = goal.time_limit_s or parameters.control.time_limit_s
-        self._limited_since_s = self._disagreed_since_s = self._ambiguous_since_s = math.nan
+        self._limited_since_s = self._ambiguous_since_s = math.nan
 
     def end(self, result: Result, reason: str, now_s: float) -> None:
         """End the active goal, if there is one."""
@@ -83,7 +81,6 @@ class GoalMonitor:
         if self._goal_id is None:
             return None
         self._limited_since_s = _since(self._limited_since_s, p.beyond_limits, p.now_s)
-        self._disagreed_since_s = _since(self._disagreed_since_s, p.disagreement, p.now_s)
         self._ambiguous_since_s = _since(self._ambiguous_since_s, bool(p.ambiguity), p.now_s)
         ending = self._pose_ending(p) if p.pose_reached is not None else self._target_ending(p, parameters)
         if ending is None:
@@ -105,11 +102,6 @@ class GoalMonitor:
             return Result.AT_POINT, p.at_point
         if p.now_s - self._limited_since_s > _LIMITED_S:
             return Result.LIMITS, "the target is beyond the joints' limits"
-        if p.now_s - self._disagreed_since_s > _DISAGREED_S:
-            return (
-                Result.DISAGREEMENT,
-                "estimators of the target's vergence disagree by more than the object's depth explains",
-            )
         if p.now_s - self._ambiguous_since_s > _AMBIGUOUS_S:
             return Result.AMBIGUOUS, p.ambiguity
         if p.now_s - max(p.image_s, self._since_s) > parameters.control.no_images_s:

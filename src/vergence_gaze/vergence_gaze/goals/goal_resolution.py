@@ -44,7 +44,7 @@ class RequestedPose:
 
 
 @dataclass(frozen=True)
-class RequestedClass:
+class ClassRequest:
     """A detected class to find and verge on."""
 
     class_name: str
@@ -52,14 +52,14 @@ class RequestedClass:
 
 def resolve_goal(
     goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, now_s: float
-) -> RequestedTarget | RequestedPose | RequestedClass:
+) -> RequestedTarget | RequestedPose | ClassRequest:
     """Return what a goal requests; raises GoalError (INVALID or UNREACHABLE)."""
     if not (math.isfinite(goal.time_limit_s) and goal.time_limit_s >= 0):
         raise GoalError(Result.INVALID, f"time_limit_s must be 0 (default) or more [s]: got {goal.time_limit_s!r}")
     if goal.kind is GoalKind.CLASS:
         if not goal.class_name:
             raise GoalError(Result.INVALID, "class_name must be one of the detector's classes: got an empty text")
-        return RequestedClass(goal.class_name)
+        return ClassRequest(goal.class_name)
     if not history.known:
         raise GoalError(Result.INVALID, "joint_states must have arrived before a goal: none has")
     if goal.kind in (GoalKind.ANGLES, GoalKind.RELATIVE_ANGLES):

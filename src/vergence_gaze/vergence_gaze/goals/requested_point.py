@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_gaze.goals.goal import TrackRequest
-from vergence_gaze.parameters import TargetParameters
+from vergence_gaze.target_parameters import TargetParameters
 from vergence_rig.geometry import eye_direction, rotation_rig_from_optical
 
 Array = npt.NDArray[np.float64]

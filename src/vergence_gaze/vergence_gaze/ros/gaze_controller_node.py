@@ -32,7 +32,6 @@ from vergence_msgs.msg import (
     GazeState,
     TargetTrack,
     TrackRequest,
-    VergenceError,
 )
 from vergence_rig.camera import CameraModel, CameraModelError
 from vergence_rig.rig import load_rig
@@ -74,10 +73,7 @@ class GazeControllerNode(Node):
         watch.create_subscription(
             JointState, "servo_node/resolution", lambda m: self._add(convert.joint_resolution(m)), latched
         )
-        watch.create_subscription(VergenceError, "vergence/error", self._on_error)
-        watch.create_subscription(
-            TargetTrack, "vergence/track", lambda m: self._add(convert.track_sighting(m, self._left))
-        )
+        watch.create_subscription(TargetTrack, "vergence/track", self._on_track)
         watch.create_subscription(
             BoxVergence, "vergence/box", lambda m: self._add(convert.box_sighting(m, self._left.fx_px))
         )
@@ -100,14 +96,14 @@ class GazeControllerNode(Node):
     def _add(self, observation: Observation) -> None:
         self._arrived.append(observation)
 
-    def _on_error(self, message: VergenceError) -> None:
+    def _on_track(self, message: TargetTrack) -> None:
         if message.contrast_window_px:
-            self._add(convert.error_contrast(message))
+            self._add(convert.track_contrast(message))
         elif not self._reads_edges:
-            # Another metric's error says nothing of contrast: vergence/edge does, and costs both sides more.
+            # Another tracker says nothing of contrast: vergence/edge does, and costs both sides more.
             self._reads_edges = True
             self._watch.create_subscription(EdgeVergence, "vergence/edge", self._on_edge)
-        self._add(convert.fovea_disparity(message, self._left.fx_px))
+        self._add(convert.track_sighting(message, self._left))
 
     def _on_edge(self, message: EdgeVergence) -> None:
         self._add(convert.edge_contrast(message))

@@ -16,23 +16,22 @@ from vergence_gaze.estimation.observations import (
     BoxSighting,
     EdgeContrast,
     EyeRotationObservation,
-    FoveaDisparity,
     JointReport,
     JointResolution,
     TrackSighting,
 )
 from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, TrackRequest
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack, VergenceError
+from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack
 from vergence_msgs.msg import TrackRequest as TrackRequestMessage
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import eye_direction, eye_position
 from vergence_rig.rig import JOINT_NAMES
+from vergence_rig.verged import best_small_window
 
 Array = npt.NDArray[np.float64]
 
 BASE_FRAME = "rig_base"
-SMALL_WINDOWS_PX = (50, 150)
 _RAY_M = 2.0
 
 
@@ -44,19 +43,6 @@ def joint_report(message: JointState) -> JointReport:
 def joint_resolution(message: JointState) -> JointResolution:
     """Return the smallest step of each joint, which servo_node publishes as positions."""
     return JointResolution(to_seconds(message.header.stamp), dict(zip(message.name, message.position, strict=False)))
-
-
-def fovea_disparity(message: VergenceError, focal_px: float) -> FoveaDisparity:
-    """Return the signed error; `focal_px` turns its standard deviation into radians."""
-    return FoveaDisparity(
-        stamp_s=to_seconds(message.header.stamp),
-        skew_s=message.pair_skew_s,
-        horizontal_rad=message.horizontal_rad,
-        sigma_rad=message.sigma_px / focal_px,
-        confidence=message.confidence,
-        usable=message.status == VergenceError.STATUS_OK and math.isfinite(message.horizontal_rad),
-        reason=message.reason,
-    )
 
 
 def track_sighting(message: TargetTrack, left_camera: CameraModel) -> TrackSighting:
@@ -92,6 +78,8 @@ def track_request(request: TrackRequest, left_camera: CameraModel, right_camera:
         message.eye = TrackRequestMessage.EYE_LEFT if request.left_eye else TrackRequestMessage.EYE_RIGHT
         x_px, y_px = camera.ray_to_pixel(np.array([[*request.xy, 1.0]]))[0]
         message.x_px, message.y_px = float(x_px), float(y_px)
+        if np.isfinite(request.extent_rad).all():
+            message.width_px, message.height_px = (camera.fx_px * extent for extent in request.extent_rad)
     return message
 
 
@@ -119,23 +107,23 @@ def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
         and (math.isfinite(message.left_azimuth_rad) or math.isfinite(message.right_azimuth_rad)),
         reason=message.reason,
         whole=message.status not in (BoxVergence.STATUS_CUT, BoxVergence.STATUS_OCCLUDED),
+        surface_sigma_rad=message.refined_sigma_px / focal_px,
+        extent_height_rad=(message.left.y_max_px - message.left.y_min_px) / focal_px,
     )
 
 
-def error_contrast(message: VergenceError) -> EdgeContrast:
-    """Return the least contrast of the small windows, which comes with the signed error."""
+def track_contrast(message: TargetTrack) -> EdgeContrast:
+    """Return the least contrast of the small windows, which comes with the track."""
     return EdgeContrast(to_seconds(message.header.stamp), message.contrast, math.nan)
 
 
 def edge_contrast(message: EdgeVergence) -> EdgeContrast:
     """Return the least contrast of the small windows, which show vergence best, and the raw metric of that window."""
-    best = (math.nan, math.nan)
-    for size, contrast, left, right in zip(
-        message.windows_px, message.contrast, message.left_to_right_px, message.right_to_left_px, strict=False
-    ):
-        if SMALL_WINDOWS_PX[0] <= size <= SMALL_WINDOWS_PX[1] and not contrast >= best[0]:
-            best = (contrast, 0.5 * (left + right)) if math.isfinite(contrast) else best
-    return EdgeContrast(to_seconds(message.header.stamp), *best)
+    stamp_s, best = to_seconds(message.header.stamp), best_small_window(message.windows_px, message.contrast)
+    if best is None:
+        return EdgeContrast(stamp_s, math.nan, math.nan)
+    metric_px = 0.5 * (message.left_to_right_px[best] + message.right_to_left_px[best])
+    return EdgeContrast(stamp_s, message.contrast[best], metric_px)
 
 
 def eye_rotation(message: EyeRotation) -> EyeRotationObservation:

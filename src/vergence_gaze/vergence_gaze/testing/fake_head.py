@@ -7,7 +7,6 @@ shafts, by the definition of the axes; only the servo plant is shared with the r
 import heapq
 import itertools
 import math
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -18,7 +17,6 @@ from vergence_gaze.control.report import Command
 from vergence_gaze.estimation.observations import (
     BoxSighting,
     EdgeContrast,
-    FoveaDisparity,
     JointReport,
     Observation,
     TrackSighting,
@@ -44,25 +42,23 @@ class VisionModel:
     right_vertical_px: float = 0.0
     stamp_error_s: float = 0.0
     track: bool = True
-    fovea: bool = True
     boxes: bool = False
     box_frame_ticks: int = 20
     box_latency_s: float = 0.11
     box_noise_px: float = 1.5
+    surface_noise_px: float = math.nan
     box_miss_share: float = 0.05
     field_margin_px: float = 15.0
     extent_rad: float = 0.1
-    answers_requests: bool = True
 
 
 @dataclass
 class FakeHead:
     """Rig, true servos, target and eyes. `visible(t)` hides the target; `target(t)` gives it (3,) in rig_base [m].
 
-    `clutter(t)` is a point that lies at the fovea while the target is hidden (an occluder), or None. `mistaken` gives,
-    by estimator ("fovea", "track", "box"), the point that it measures instead of the target at `t`, or None while it is
-    right. `servos` are the real servos by joint, where they differ from the rig's description. Time starts at
-    `begin_s`.
+    `mistaken` gives, by estimator ("fovea" for the contrast, "track", "box"), the point that it measures instead of the
+    target at `t`, or None while it is right. `servos` are the real servos by joint, where they differ from the rig's
+    description. Time starts at `begin_s`.
     """
 
     rig: Rig
@@ -71,7 +67,6 @@ class FakeHead:
     seed: int = 0
     start_rad: Mapping[str, float] = field(default_factory=dict)
     visible: Callable[[float], bool] = lambda time_s: True
-    clutter: Callable[[float], Array] | None = None
     mistaken: Mapping[str, Callable[[float], Array | None]] = field(default_factory=dict)
     servos: Mapping[str, ServoSpec] = field(default_factory=dict)
     begin_s: float = 0.0
@@ -91,13 +86,9 @@ class FakeHead:
             self._plants[name] = ServoPlant(servo, start + self._random.uniform(-half, half), self.begin_s)
             self._models[name] = ServoPlant(joint.servo, start, self.begin_s)
         self.reported_rad = {name: self.start_rad.get(name, 0.0) for name in JOINT_NAMES}
-        self._goal_id = 0
-        self._track_id, self._lock_s = 1, self.begin_s + 0.1
+        self._goal_id, self._track_id, self._lock_s = 0, 0, self.begin_s
         self._pending_frame: tuple[float, Array, bool] | None = None
         self._left_pixel = np.full(2, math.nan)
-        self._lately: deque[Array] = deque(maxlen=22)
-        self._turned = False
-        self._slow_ticks = 0
 
     @property
     def time_s(self) -> float:
@@ -117,10 +108,15 @@ class FakeHead:
 
     def execute(self, command: Command) -> None:
         """Do what a controller's cycle asks for: turn the joints, and track for a goal."""
-        if command.track_request is not None and self.vision.answers_requests:
-            self._goal_id = command.track_request.goal_id
+        if command.track_request is not None:
+            self.track_for(command.track_request.goal_id)
         if command.joints_rad is not None:
             self.command(command.joints_rad)
+
+    def track_for(self, goal_id: int) -> None:
+        """Track the target on behalf of a goal from now on; 0 ends that."""
+        self._goal_id, self._lock_s = goal_id, self.time_s
+        self._track_id += 1
 
     def true_errors_rad(self) -> Array:
         """Return (version, vergence, tilt) to the target minus the true ones (3,)."""
@@ -142,7 +138,6 @@ class FakeHead:
         now_s = self.time_s
         for plant in (*self._plants.values(), *self._models.values()):
             plant.step(now_s)
-        self._note_saccades()
         if self._ticks % self.report_ticks == 0:
             for name in JOINT_NAMES:
                 self.reported_rad[name] = self._models[name].modelled_rad
@@ -170,16 +165,6 @@ class FakeHead:
     def _project(self, left: bool) -> Array:
         return self.project(self.target(self.time_s), left)
 
-    def _note_saccades(self) -> None:
-        """As the class-free tracker does: a new lock once the eyes rest after a turn of 2.5 degrees in 70 ms."""
-        speed = max(abs(plant.velocity_rad_s) for plant in self._plants.values())
-        self._slow_ticks = self._slow_ticks + 1 if speed < 0.35 else 0
-        self._lately.append(self.true_rad)
-        self._turned |= bool(np.abs(self._lately[-1] - self._lately[0]).max() > math.radians(2.5))
-        if self._turned and self._slow_ticks == 9:
-            self._track_id, self._lock_s, self._turned = self._track_id + 1, self.time_s, False
-            self._lately.clear()
-
     def _see_pair(self, left_s: float, left_xy: Array, visible: bool, right_s: float) -> None:
         vision, focal = self.vision, self.rig.left_camera.fx_px
         right_xy = self._misaligned(self._project(left=False))
@@ -193,8 +178,7 @@ class FakeHead:
         sigma = 1.5 * vision.noise_px / focal
         skew_s = right_s - left_s
         if vision.track:
-            locked = left_s > self._lock_s or self._goal_id > 0
-            usable = in_left and locked
+            usable = in_left and self._goal_id > 0
             self._send(
                 arrival_s,
                 TrackSighting(
@@ -213,13 +197,6 @@ class FakeHead:
             )
         on_fovea = in_left and math.hypot(*left_xy) < 0.05
         at_fovea = disparity + self._mistake_rad("fovea", left_s, disparity)
-        if vision.fovea:
-            value = at_fovea if on_fovea else math.nan
-            if not visible and self.clutter is not None:
-                left, right = self.project(self.clutter(left_s), True), self.project(self.clutter(left_s), False)
-                value = math.atan(left[0]) - math.atan(right[0])
-            usable = math.isfinite(value) and abs(value) < math.atan(150.0 / focal)
-            self._send(arrival_s, FoveaDisparity(left_s, skew_s, value, sigma, 0.9 if usable else 0.0, usable))
         pixels = abs(at_fovea) * focal if on_fovea and in_right else math.inf
         contrast = 0.3 + 0.68 * (1.0 - math.exp(-((pixels / 3.6) ** 1.2))) + self._random.normal(0.0, 0.03)
         self._send(arrival_s, EdgeContrast(left_s, contrast, min(pixels, 8.0) + 1.0))
@@ -241,6 +218,9 @@ class FakeHead:
             left_xy, right_xy = self.project(elsewhere, left=True), self.project(elsewhere, left=False)
         if self._random.random() < vision.box_miss_share:
             left_xy = right_xy = None
+        surface_sigma_rad, surface_rad = vision.surface_noise_px / focal, math.nan
+        if left_xy is not None and right_xy is not None:
+            surface_rad = math.atan(left_xy[0]) - math.atan(right_xy[0])
         angles = np.full(4, math.nan)
         for i, xy in enumerate((left_xy, right_xy)):
             if xy is not None:
@@ -256,11 +236,13 @@ class FakeHead:
                 left_elevation_rad=float(angles[1]),
                 right_azimuth_rad=float(angles[2]),
                 right_elevation_rad=float(angles[3]),
-                surface_disparity_rad=math.nan,
+                surface_disparity_rad=surface_rad + self._random.normal(0.0, 1.0) * surface_sigma_rad,
+                surface_sigma_rad=surface_sigma_rad,
                 sigma_rad=vision.box_noise_px / focal,
                 extent_rad=vision.extent_rad,
                 class_name="target" if usable else "",
                 usable=usable,
+                extent_height_rad=vision.extent_rad,
             ),
         )
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.boxes.errors import DetectorError, ModelFileError, ModelLayoutError
+from vergence_rig.install_hint import install_hint
 
 SHIPPED_MODEL = Path(__file__).resolve().parent.parent / "models" / "rubik_cube.onnx"
 
@@ -64,7 +65,7 @@ class ModelSession:
         try:
             import onnxruntime
         except ImportError as error:
-            raise DetectorError("onnxruntime is not installed: pip install onnxruntime") from error
+            raise DetectorError(f"onnxruntime is not installed: {install_hint('onnxruntime')}") from error
         provider = _PROVIDERS[device]
         available = onnxruntime.get_available_providers()
         if provider not in available:

@@ -18,9 +18,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.edges.oriented_edges import OrientedField
 from vergence_metric.edges.windows import Window
-
-SMALL_WINDOWS_PX = (50, 150)
-"""Smallest and largest side of the windows whose contrast shows vergence best: larger ones mix depths."""
+from vergence_rig.verged import SMALL_WINDOWS_PX, best_small_window
 
 _FOVEAL_SIGMAS = 4.0  # a window this many times as wide as the foveal weight's deviation holds it
 _LATTICE = 24  # points along a window's side that represent all its pixels
@@ -57,11 +55,9 @@ def small_windows(windows: Sequence[Window], foveal_sigma_px: float) -> tuple[Wi
 
 def least_contrast(field: OrientedField, truncation_px: int) -> WindowContrast:
     """Return the least contrast of the windows of SMALL_WINDOWS_PX; NaN where none is measurable."""
-    low, high = SMALL_WINDOWS_PX
-    found = zip(contrasts(field, truncation_px).both.tolist(), field.windows, strict=True)
-    small = [WindowContrast(contrast, w.size_px) for contrast, w in found if low <= w.size_px <= high]
-    measured = [one for one in small if math.isfinite(one.contrast)]
-    return min(measured, key=lambda one: one.contrast, default=WindowContrast(math.nan, SMALL_WINDOWS_PX[0]))
+    found, sizes_px = contrasts(field, truncation_px).both.tolist(), [window.size_px for window in field.windows]
+    best = best_small_window(sizes_px, found)
+    return WindowContrast(math.nan, SMALL_WINDOWS_PX[0]) if best is None else WindowContrast(found[best], sizes_px[best])
 
 
 def contrasts(field: OrientedField, truncation_px: int) -> Contrasts:

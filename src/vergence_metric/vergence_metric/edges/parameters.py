@@ -110,8 +110,7 @@ class ContrastParameters(Parameters):
     )
     foveal_sigma_px: float = parameter(
         14.0,
-        "standard deviation of the Gaussian weight about the image centre in the foveal contrast, by which `verged` "
-        "is decided",
+        "standard deviation of the Gaussian weight about the image centre in the foveal contrast",
         unit="px",
         minimum=1.0,
         maximum=1000.0,

@@ -51,8 +51,8 @@ class EdgeMetricResult:
 
     `left_grey` and `right_grey` (h, w) uint8 are the images compared, the right one aligned. Arrays carry
     the names of vergence_msgs/EdgeVergence; values are float64, NaN where `status` (WindowStatus) gives a reason. Only
-    `foveal_contrast`, the input of FovealVergenceClassifier, and `least_contrast` of the small windows are measured at
-    once; the arrays are measured when they are read. `stage_s` is the duration of each stage so far [s].
+    `foveal_contrast`, which is weighted by a Gaussian about the centre, and `least_contrast` of the small windows are
+    measured at once; the arrays are measured when they are read. `stage_s` is the duration of each stage so far [s].
     """
 
     windows: tuple[Window, ...]

@@ -1,5 +1,6 @@
 """All measurements on a pair of images, stage by stage, so that each can be published as soon as it is available."""
 
+import math
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
@@ -79,8 +80,9 @@ class PairMeasurement:
         return self._estimator.estimate(edge.left_grey, edge.right_grey)
 
     def verged(self, edge: EdgeMetricResult, error_px: float, confidence: float) -> bool:
-        """Return whether the eyes are verged, by foveal contrast, signed error, and the result of the last pair."""
-        return self._classifier.update(edge.foveal_contrast, error_px, confidence)
+        """Return whether the eyes are verged, by contrast, signed error, and the result of the last pair."""
+        left, _ = self._models or self._rig_models
+        return self._classifier.update(edge.least_contrast.contrast, math.atan(error_px / left.fx_px), confidence)
 
     def request_track(self, request: TrackRequest) -> None:
         """Let the tracker follow a point, from the next pair on; may be called from another thread."""

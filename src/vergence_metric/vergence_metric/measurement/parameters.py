@@ -7,39 +7,14 @@ from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.edges.parameters import ContrastParameters, EdgeParameters
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.tracking.parameters import TrackerParameters
-from vergence_rig.parameters import Groups, ParameterError, Parameters, parameter
+from vergence_rig.parameters import Groups, parameter
+from vergence_rig.verged import VergedLimits
 
 
 @dataclass(frozen=True)
-class VergedParameters(Parameters):
-    """When a pair is `verged`: thresholds with hysteresis on the foveal contrast and the signed error."""
+class VergedParameters(VergedLimits):
+    """When a pair is `verged`: the controller's limits of contrast and signed error, with hysteresis."""
 
-    enter_contrast: float = parameter(
-        0.6, "foveal contrast up to which `verged` can be set", minimum=0.0, maximum=2.0, formerly="verged_contrast"
-    )
-    leave_contrast: float = parameter(
-        0.72,
-        "foveal contrast above which `verged` is cleared",
-        minimum=0.0,
-        maximum=2.0,
-        formerly="verged_leave_contrast",
-    )
-    enter_px: float = parameter(
-        2.0,
-        "absolute signed error up to which `verged` can be set",
-        unit="px",
-        minimum=0.0,
-        maximum=1000.0,
-        formerly="verged_px",
-    )
-    leave_px: float = parameter(
-        4.0,
-        "absolute signed error above which `verged` is cleared",
-        unit="px",
-        minimum=0.0,
-        maximum=1000.0,
-        formerly="verged_leave_px",
-    )
     min_confidence: float = parameter(
         0.5,
         "least confidence of a signed error that counts for `verged`; with less the error is unknown",
@@ -47,12 +22,6 @@ class VergedParameters(Parameters):
         maximum=1.0,
         formerly="verged_confidence",
     )
-
-    def check(self) -> None:
-        """Raise ParameterError where a threshold to leave is below the one to enter."""
-        for enter, leave in (("enter_contrast", "leave_contrast"), ("enter_px", "leave_px")):
-            if getattr(self, leave) < getattr(self, enter):
-                raise ParameterError(leave, getattr(self, leave), f"at least {enter} ({getattr(self, enter):g})")
 
 
 @dataclass(frozen=True)

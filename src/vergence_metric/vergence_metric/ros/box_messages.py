@@ -63,6 +63,7 @@ def box_vergence_message(result: BoxVergenceResult, header: Header, pair_skew_s:
         sigma_px=result.sigma_px,
         refined_horizontal_px=result.refined.horizontal_px,
         refined_vertical_px=result.refined.vertical_px,
+        refined_sigma_px=result.refined.sigma_px,
         refined_confidence=result.refined.confidence,
         size_ratio=float(result.corners.size_ratio),
         left_azimuth_rad=result.left_rad[0],

@@ -7,7 +7,6 @@ from std_msgs.msg import Header
 
 from vergence_metric.disparity import Disparity
 from vergence_metric.disparity.angular_disparity import AngularDisparity
-from vergence_metric.edges.contrast import WindowContrast
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_msgs.msg import EdgeVergence, VergenceError
 
@@ -38,16 +37,9 @@ def edge_message(result: EdgeMetricResult, verged: bool, header: Header, pair_sk
 
 
 def error_message(
-    disparity: Disparity,
-    angular: AngularDisparity | None,
-    contrast: WindowContrast,
-    header: Header,
-    pair_skew_s: float,
+    disparity: Disparity, angular: AngularDisparity | None, header: Header, pair_skew_s: float
 ) -> VergenceError:
-    """Return the signed disparity and the contrast of a pair; `angular` is None without camera models.
-
-    `verged` is left to be set, because it depends on the error itself.
-    """
+    """Return the signed disparity of a pair; `angular` is None without camera models."""
     message = VergenceError(
         header=header,
         pair_skew_s=pair_skew_s,
@@ -60,8 +52,6 @@ def error_message(
         estimator=disparity.estimator,
         status=int(disparity.status),
         reason=disparity.reason,
-        contrast_window_px=contrast.window_px,
-        contrast=contrast.contrast,
     )
     if angular is None and disparity.ok:
         message.status = VergenceError.STATUS_NO_CAMERA_INFO

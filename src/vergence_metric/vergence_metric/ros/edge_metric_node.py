@@ -5,6 +5,7 @@ from time import monotonic_ns
 from typing import Any
 
 from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import Header
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.images import array_to_image
@@ -70,27 +71,34 @@ class EdgeMetricNode(MetricNode):
         models = self._stereo.models_for(pair.left.pixels)
         with self._times.measure("metric"):
             edge = self._measurement.edge(pair.left.pixels, pair.right.pixels)
+        if self._edge_publisher.get_subscription_count() or self._error_publisher.get_subscription_count():
+            self._publish_fovea(edge, models, header, skew_s)
+        self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
+        self._times.add_all(edge.stage_s)
+        self._publish_track(pair, edge, models)
+        if self._overlay_publisher.get_subscription_count():
+            with self._times.measure("overlay"):
+                disparity = self._measurement.disparity(edge)
+                picture = draw_overlay(pair.left.pixels, edge, disparity)
+                self._overlay_publisher.publish(array_to_image(picture, header))
+        self._measurement.update_alignment()
+        self._failure = None
+
+    def _publish_fovea(
+        self, edge: EdgeMetricResult, models: Models | None, header: Header, pair_skew_s: float
+    ) -> None:
         with self._times.measure("disparity"):
             disparity = self._measurement.disparity(edge)
         angular = models and angular_disparity(
             *models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px
         )
         with self._times.measure("publish"):
-            error = error_message(disparity, angular, edge.least_contrast, header, skew_s)
-            error.verged = self._measurement.verged(edge, error.horizontal_px, error.confidence)
+            error = error_message(disparity, angular, header, pair_skew_s)
+            verged = self._measurement.verged(edge, error.horizontal_px, error.confidence)
             self._error_publisher.publish(error)
             if self._edge_publisher.get_subscription_count():
                 # Its arrays are measured only now.
-                self._edge_publisher.publish(edge_message(edge, error.verged, header, skew_s))
-        self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
-        self._times.add_all(edge.stage_s)
-        self._publish_track(pair, edge, models)
-        if self._overlay_publisher.get_subscription_count():
-            with self._times.measure("overlay"):
-                picture = draw_overlay(pair.left.pixels, edge, disparity)
-                self._overlay_publisher.publish(array_to_image(picture, header))
-        self._measurement.update_alignment()
-        self._failure = None
+                self._edge_publisher.publish(edge_message(edge, verged, header, pair_skew_s))
 
     def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, models: Models | None) -> None:
         with self._times.measure("tracker"):

@@ -16,6 +16,7 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
+from vergence_common.awaited import report_awaited
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.images import ImageError, compressed_to_array, image_to_array
 from vergence_common.local_images import LocalImages
@@ -28,6 +29,9 @@ from vergence_metric.pairs.stream_health import StreamHealth
 from vergence_rig.camera import CameraModel, CameraModelError
 
 SIDES = ("left", "right")
+_SOURCES = (
+    "Images come from camera_node (rig.launch.py), sim_node (sim.launch.py), photo_node or another camera's driver"
+)
 
 # camera_info is small and repeated with every image; best effort is compatible with every publisher.
 _INFO_QOS = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
@@ -100,6 +104,7 @@ class StereoInput:
             diagnostics.add(f"{name} images", lambda side=side: self._stream_report(side))  # type: ignore[misc]
         diagnostics.add("pairs", self._pairs_report)
         diagnostics.add("cameras", self._cameras_report)
+        report_awaited(node, lambda: [health.topic for health in self._health if not health.received], _SOURCES)
 
     @property
     def paused(self) -> bool:

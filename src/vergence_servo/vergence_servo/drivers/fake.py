@@ -5,10 +5,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from vergence_rig.banner import banner
 from vergence_rig.parameters import Parameters, parameter
 from vergence_servo.drivers.protocol import Backend, ChannelError, on_grid
 
-_WARNING = "backend 'fake': no servo moves; set 'backend' and 'servos' for a real head"
+_WARNING = banner(
+    "NO SERVO MOVES: this head runs on fake servos",
+    "backend 'fake': no servo moves; set 'backend' and 'servos' for a real head (docs/servos.md)",
+)
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,8 @@ class KernelPwmDriver:
         if not 0 <= channel < self._count:
             raise ChannelError(
                 f"backend 'kernel_pwm': channel must be 0 to {self._count - 1}: got {channel} ({self._chip}; GPIO 12, "
-                f"13, 18, 19 are channels 0, 1, 2, 3 on a Pi 5 and 0, 1, 0, 1 on earlier ones)"
+                "13, 18, 19 are channels 0, 1, 2, 3 on a Pi 5 and 0, 1, 0, 1 on earlier ones; a servo may name another "
+                "backend in servos.yaml)"
             )
         return self._chip / f"pwm{channel}"
 

@@ -11,7 +11,7 @@ from vergence_rig.parameters import Parameters, parameter
 from vergence_servo.drivers.protocol import Backend, ChannelError, DriverIoError, DriverUnavailableError
 
 _JITTER_WARNING = "backend 'lgpio' times pulses in software: servos jitter under load; kernel_pwm or pca9685 do not"
-_PACKAGE = "sudo apt install python3-lgpio, or pip install lgpio"
+_PACKAGE = "sudo apt install python3-lgpio"
 _GROUP = "sudo usermod -aG gpio $USER, then log in anew"
 _LAST_GPIO = 53
 

@@ -8,13 +8,13 @@ import errno
 from dataclasses import dataclass
 from typing import Any
 
+from vergence_rig.install_hint import install_hint
 from vergence_rig.parameters import Parameters, parameter
 from vergence_servo.drivers.channels_in_use import ChannelsInUse
 from vergence_servo.drivers.protocol import Backend, ChannelError, DriverIoError, DriverUnavailableError
 
 _CHANNELS = 16
 _TICKS = 4096
-_PACKAGE = "pip install adafruit-circuitpython-pca9685 (Adafruit's driver, with Blinka)"
 _I2C = "enable I2C: dtparam=i2c_arm=on in /boot/firmware/config.txt, reboot"
 _GROUP = "sudo usermod -aG i2c $USER, then log in anew"
 
@@ -47,7 +47,7 @@ class Pca9685Driver:
         try:
             from adafruit_pca9685 import PCA9685
         except ImportError as error:
-            raise DriverUnavailableError(f"backend 'pca9685': {error}: {_PACKAGE}") from error
+            raise DriverUnavailableError(f"backend 'pca9685': {error}: {_packages()}") from error
         self._chip = _open(PCA9685, _board_bus() if bus is None else bus, values)
         self._channels = ChannelsInUse(self._write)
         # The true step: the prescaler is a whole number.
@@ -81,13 +81,17 @@ class Pca9685Driver:
             raise DriverIoError(number, f"PCA9685 channel {channel}: {error}") from error
 
 
+def _packages() -> str:
+    return f"sudo apt install python3-libgpiod, and {install_hint('adafruit-circuitpython-pca9685')}"
+
+
 def _board_bus() -> Any:
     try:
         import board
 
         return board.I2C()
     except ImportError as error:
-        raise DriverUnavailableError(f"backend 'pca9685': {error}: {_PACKAGE}") from error
+        raise DriverUnavailableError(f"backend 'pca9685': {error}: {_packages()}") from error
     except PermissionError as error:
         raise DriverUnavailableError(f"backend 'pca9685': {error}: {_GROUP}") from error
     except (NotImplementedError, AttributeError, OSError, ValueError, RuntimeError) as error:

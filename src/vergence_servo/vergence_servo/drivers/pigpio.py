@@ -22,7 +22,7 @@ _ERRORS = {
     -7: "pulse width not 0 or 500 to 2500 us",
     -41: "not permitted on this GPIO (pigpiod -x mask)",
 }
-_START = "start it on the Pi: sudo apt install pigpio && sudo systemctl enable --now pigpiod (not on a Pi 5)"
+_START = "start pigpiod on the Pi (not on a Pi 5); Ubuntu 24.04 has no package of it: docs/servos.md, 'pigpio'"
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_nanoseconds
 from vergence_rig.rig import JOINT_NAMES, load_rig
-from vergence_servo.calibration import ServoCalibrationError, load_servos, servo_limits
+from vergence_servo.calibration import load_servos, servo_limits
 from vergence_servo.command_guard import (
     CommandRefusedError,
     StampGuard,
@@ -30,8 +30,9 @@ from vergence_servo.command_guard import (
     ordered_positions,
 )
 from vergence_servo.commanders import conflict
-from vergence_servo.drivers.registry import find_backend, open_driver
-from vergence_servo.guardian import Guardian
+from vergence_servo.driver_set import DriverSet, backends_of
+from vergence_servo.drivers.registry import find_backend
+from vergence_servo.guardian import Guardians
 from vergence_servo.last_pose import default_pose_file, read_pose, write_pose
 from vergence_servo.parameters import ServoNodeParameters, parameter_groups
 from vergence_servo.ros import servo_messages as convert
@@ -52,29 +53,31 @@ class ServoNode(Node):
         values: ServoNodeParameters = self._settings.value
         servos = load_servos(values.servos)
         rig = load_rig(values.rig)
-        for name in values.joints:
-            if name not in servos:
-                raise ServoCalibrationError(f"joint '{name}' has no servo: servos.yaml has {', '.join(servos)}")
+        backends = backends_of(servos, values.joints, values.backend)
         limits = {
             name: servo_limits(name, servos[name], rig.joints[name] if name in JOINT_NAMES else None)
             for name in values.joints
         }
-        backend_values = dataclasses.asdict(self._settings.get(find_backend(values.backend).parameters))
-        self._driver = open_driver(values.backend, backend_values)
-        self._guardian: Guardian | None = None
+        self._drivers = DriverSet(backends, lambda backend: dataclasses.asdict(self._settings.get(backend.parameters)))
+        self._guardians: Guardians | None = None
         try:
-            if values.guardian and self._driver.outlives_process:
-                channels = [limit.calibration.channel for limit in limits.values()]
-                self._guardian = Guardian(values.backend, backend_values, channels)
+            if values.guardian:
+                channels = {name: limit.calibration.channel for name, limit in limits.items()}
+                self._guardians = Guardians(self._drivers, channels)
             self._pose_file = Path(values.pose_file) if values.pose_file else default_pose_file()
             self._pose = read_pose(self._pose_file)
             self._head = ServoHead(
-                self._driver, limits, values, self._pose, time.monotonic(), self._settings.get(RetryParameters)
+                self._drivers.by_joint,
+                limits,
+                values,
+                self._pose,
+                time.monotonic(),
+                self._settings.get(RetryParameters),
             )
         except BaseException:
-            self._driver.close()
-            if self._guardian is not None:
-                self._guardian.dismiss()
+            self._drivers.close()
+            if self._guardians is not None:
+                self._guardians.dismiss()
             raise
         self._stamps = self._new_stamp_guard(values)
         self._settings.on_change(self._changed)
@@ -85,8 +88,9 @@ class ServoNode(Node):
         self._connect(values)
 
     def _begin(self, values: ServoNodeParameters) -> None:
-        if find_backend(values.backend).warning:
-            self.get_logger().warning(find_backend(values.backend).warning)
+        for backend in map(find_backend, self._drivers.by_backend):
+            if backend.warning:
+                self.get_logger().warning(backend.warning)
         if not values.enabled:
             self._head.enable(False, time.monotonic())
         elif values.start == "last_pose" and self._pose:
@@ -95,8 +99,8 @@ class ServoNode(Node):
             self.get_logger().warning(f"no last pose in {self._pose_file}: the servos start released")
 
     def _connect(self, values: ServoNodeParameters) -> None:
-        diagnostics = Diagnostics(self, values.backend)
-        diagnostics.add("servos", lambda: head_report(self._head, values.backend, self._driver, self._guardian))
+        diagnostics = Diagnostics(self, self._drivers.description())
+        diagnostics.add("servos", lambda: head_report(self._head, self._drivers, self._guardians))
         diagnostics.add("commands", lambda: commands_report(self._counts, self._conflict, time.monotonic()))
         for channel in self._head.channels.values():
             diagnostics.add(channel.name, partial(self._report_channel, channel))
@@ -104,8 +108,8 @@ class ServoNode(Node):
         self._states = watch.create_publisher(JointState, "joint_states")
         latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
         steps_rad = {
-            name: channel.limits.calibration.step_rad(self._driver.resolution_us)
-            for name, channel in self._head.channels.items()
+            name: self._head.channels[name].limits.calibration.step_rad(driver.resolution_us)
+            for name, driver in self._drivers.by_joint.items()
         }
         self._resolution = watch.create_publisher(JointState, "~/resolution", latched)
         self._resolution.publish(convert.resolution(self.get_clock().now().to_msg(), steps_rad))
@@ -226,9 +230,9 @@ class ServoNode(Node):
                 time.sleep(0.005)
         self._save_pose()
         self._head.release(time.monotonic())
-        self._driver.close()
-        if self._guardian is not None:
-            self._guardian.dismiss()
+        self._drivers.close()
+        if self._guardians is not None:
+            self._guardians.dismiss()
 
 
 def main(args: list[str] | None = None) -> int:

@@ -13,12 +13,14 @@ from std_msgs.msg import Header
 
 from vergence_common.diagnostics import OK, WARN, Diagnostics, Report
 from vergence_common.images import array_to_compressed, array_to_image
+from vergence_common.node_main import StartAbandonedError
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import to_nanoseconds, to_stamp
 from vergence_rig.parameters import Groups
 from vergence_rig.rig import JOINT_NAMES
 from vergence_sim.clock_parameters import ClockParameters
+from vergence_sim.joint_speeds import JointSpeeds
 from vergence_sim.parameters import SimParameters
 from vergence_sim.real_time import Event, Schedule
 from vergence_sim.ros.clock_server import START_NS, ClockServer
@@ -26,6 +28,7 @@ from vergence_sim.ros.sim_messages import camera_info, joint_state
 from vergence_sim.world import EYES, Picture, World
 
 _ROUNDING_S = 1e-6
+_ASKED_EVERY_S = 0.05
 
 
 class RealTimeNode(Node):
@@ -40,7 +43,7 @@ class RealTimeNode(Node):
     def __init__(self, name: str, groups: Groups, **options: Any) -> None:
         super().__init__(name, **options)
         self._settings = declare(self, groups)
-        self._diagnostics = Diagnostics(self)
+        self._diagnostics = Diagnostics(self, "simulated head")
         self._qos = qos = watch_qos(self, self._diagnostics)
         self._images = {eye: qos.create_publisher(Image, f"{eye}/image_raw", IMAGE_QOS) for eye in EYES}
         self._jpegs = {
@@ -53,6 +56,7 @@ class RealTimeNode(Node):
         self._settings.on_change(self._on_settings)
         self._actions: deque[tuple[float, Callable[[Any, float], None]]] = deque()
         self._published = dict.fromkeys(EYES, 0)
+        self._reported_speeds, self._true_speeds = JointSpeeds(), JointSpeeds()
         self._dropped = 0
         self._refused: list[str] = []
         self._stop = threading.Event()
@@ -72,8 +76,11 @@ class RealTimeNode(Node):
         self._start_s = START_NS * 1e-9
         self._thread = threading.Thread(target=self._run, name="simulation", daemon=True)
         self._thread.start()
-        # A world that cannot start ends the node with its reason.
-        self._started.wait()
+        # A world that cannot start ends the node with its reason. Making one takes seconds: a node that is asked to end
+        # meanwhile does not wait for it.
+        while not self._started.wait(_ASKED_EVERY_S):
+            if not self.context.ok():
+                raise StartAbandonedError
         if self._failure is not None:
             raise OSError(str(self._failure)) from self._failure
 
@@ -202,9 +209,11 @@ class RealTimeNode(Node):
         world.advance_to(event.due_s)
         stamp = to_stamp(self._start_s + world.time_s)
         if event.kind == "joints":
-            self._joints.publish(joint_state(stamp, world.joint_states()))
+            reported, true = world.joint_states(), world.true_joints()
+            self._joints.publish(joint_state(stamp, reported, self._reported_speeds.at(world.time_s, reported)))
+            true_speeds = self._true_speeds.at(world.time_s, true)
             if self._true_joints.get_subscription_count():
-                self._true_joints.publish(joint_state(stamp, world.true_joints()))
+                self._true_joints.publish(joint_state(stamp, true, true_speeds))
             return
         header = Header(stamp=stamp, frame_id=f"{event.eye}_camera_optical_frame")
         picture = self._image_pool.submit(world.expose(event.eye))

@@ -13,10 +13,13 @@ from vergence_sim.optics import Lens
 from vergence_sim.truth import TrueBox, Truth
 
 
-def joint_state(stamp: Time, angles_rad: Mapping[str, float]) -> JointState:
-    """Return joint angles by name."""
+def joint_state(stamp: Time, angles_rad: Mapping[str, float], speeds_rad_s: Mapping[str, float]) -> JointState:
+    """Return joint angles and speeds by name."""
     return JointState(
-        header=Header(stamp=stamp, frame_id="rig_base"), name=list(angles_rad), position=list(angles_rad.values())
+        header=Header(stamp=stamp, frame_id="rig_base"),
+        name=list(angles_rad),
+        position=list(angles_rad.values()),
+        velocity=[speeds_rad_s[name] for name in angles_rad],
     )
 
 

@@ -19,6 +19,7 @@ from vergence_bringup.demo.report import write_report
 from vergence_bringup.demo.result import StationResult, all_passed, duration_text, table, verdict_line, write_summary
 from vergence_bringup.demo.stations import Station, stations
 from vergence_bringup.demo.visits import Runner, visit_all
+from vergence_bringup.machine import shell_hint
 from vergence_bringup.node_table import PHOTOGRAPHED
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir, environment
 from vergence_bringup.ros.simulated_head import simulated_head
@@ -70,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         if "ROS_DOMAIN_ID" not in os.environ:
             # Separate from every other head on this machine.
             os.environ["ROS_DOMAIN_ID"] = str(stack.enter_context(own_domain()))
-            _say(f"to watch from another shell: source env.sh; export ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
+            _say(f"to watch from another shell: {shell_hint()}; export ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
         return _run(options, rig, chosen, photographs)
 
 

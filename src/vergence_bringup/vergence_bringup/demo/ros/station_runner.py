@@ -22,6 +22,7 @@ from vergence_bringup.figures.pictures import (
     with_windows,
     write_image,
 )
+from vergence_bringup.ros.look import result_name
 from vergence_common.stamps import to_seconds
 from vergence_metric.measurement.edge_metric import EdgeMetric
 from vergence_msgs.action import LookAt
@@ -94,7 +95,7 @@ class StationRunner:
         marks = len(recorder.states), len(recorder.edges), len(recorder.truths), len(recorder.boxes)
         goal = class_goal(station.target, _LIMIT_S) if station.by_class else _click(truth)
         result = recorder.look_at(goal, self._check_alive, _LIMIT_S + 10.0)
-        answer = _answer(result.result)
+        answer = result_name(result.result)
         reason = "" if result.result == LookAt.Result.VERGED else result.reason or answer
         if station.moving:
             self._stage.set_moving(station, True)
@@ -197,12 +198,6 @@ def _click(truth: Any) -> LookAt.Goal:
     goal.header.stamp = truth.header.stamp
     goal.left_x_px, goal.left_y_px = float(round(truth.left_x_px)), float(round(truth.left_y_px))
     return goal
-
-
-def _answer(result: int) -> str:
-    """Return the name of a result of LookAt."""
-    names = (name for name in dir(LookAt.Result) if name.isupper() and getattr(LookAt.Result, name) == result)
-    return next(names, str(result))
 
 
 def _largest_known(values: Iterable[float]) -> float:

@@ -1,0 +1,170 @@
+"""`vergence look`: sends a goal to gaze/look_at, shows its progress and result; needs rclpy, not the ros2 command."""
+
+import argparse
+import signal
+import sys
+import threading
+import time
+from typing import Any
+
+import rclpy
+from action_msgs.msg import GoalStatus
+from rclpy.action import ActionClient
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from vergence_bringup.commands.look_request import (
+    LookRequest,
+    add_arguments,
+    feedback_line,
+    look_request,
+    result_line,
+)
+from vergence_bringup.graph_errors import GraphError
+from vergence_msgs.action import LookAt
+
+__all__ = ["add_arguments", "run"]
+
+_NOT_VERGED, _INTERRUPTED = 1, 130
+_CANCEL_S, _SLICE_S = 5.0, 0.1
+
+
+def run(options: argparse.Namespace) -> int:
+    """Look; returns 0 if the eyes verged, 1 if not, 2 for bad input, 130 after Ctrl-C, which cancels the goal."""
+    request = look_request(options)
+    stop_asked = threading.Event()
+    # Without rclpy's handlers, since after Ctrl-C the goal is still to be cancelled; and without an exception in the
+    # middle of whatever rclpy does then.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop_asked.set())
+    look = Look(options.namespace, stop_asked)
+    try:
+        return look.at(request, options.time_limit, options.wait)
+    except GraphError as error:
+        print(f"vergence look: {error}", file=sys.stderr)
+        return _NOT_VERGED
+    except _InterruptedError:
+        look.cancel()
+        print("\nended: the goal is cancelled", file=sys.stderr)
+        return _INTERRUPTED
+    finally:
+        look.close()
+
+
+class _InterruptedError(Exception):
+    """Ctrl-C, or SIGTERM."""
+
+
+class Look:
+    """A client of gaze/look_at, spun by the calling thread until `stop_asked` is set."""
+
+    def __init__(self, namespace: str, stop_asked: threading.Event) -> None:
+        self._stop_asked = stop_asked
+        self._node = Node("vergence_look", namespace=namespace or None)
+        self._client = ActionClient(self._node, LookAt, "gaze/look_at")
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._sent: Any = None
+        self._progress = _Progress()
+
+    def at(self, request: LookRequest, time_limit_s: float, wait_s: float) -> int:
+        """Send the goal, show its progress until it ends, and return the exit status. Raises GraphError."""
+        self._wait_for_controller(wait_s)
+        print(f"looking at {request.text}", flush=True)
+        self._sent = self._client.send_goal_async(_goal(request, time_limit_s), feedback_callback=self._on_feedback)
+        handle = self._spin_until(self._sent)
+        if not handle.accepted:
+            raise GraphError("gaze/look_at refused the goal")
+        answer = self._spin_until(handle.get_result_async())
+        self._progress.end()
+        if answer.status == GoalStatus.STATUS_UNKNOWN:
+            raise GraphError("gaze_controller_node no longer has the goal: it was started anew meanwhile")
+        result = answer.result
+        point, frame = result.fixation_point.point, result.fixation_point.header.frame_id
+        name = result_name(result.result)
+        place = (point.x, point.y, point.z)
+        print(result_line(name, result.time_s, result.reason, place, frame, result.vergence_rad), flush=True)
+        return 0 if result.result == LookAt.Result.VERGED else _NOT_VERGED
+
+    def cancel(self) -> None:
+        """Cancel the goal, if one was sent."""
+        self._progress.end()
+        if self._sent is None:
+            return
+        self._executor.spin_until_future_complete(self._sent, timeout_sec=_CANCEL_S)
+        if self._sent.done() and self._sent.result().accepted:
+            cancelled = self._sent.result().cancel_goal_async()
+            self._executor.spin_until_future_complete(cancelled, timeout_sec=_CANCEL_S)
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown()
+
+    def _wait_for_controller(self, wait_s: float) -> None:
+        deadline_s = time.monotonic() + wait_s
+        while not self._client.server_is_ready():
+            if time.monotonic() > deadline_s:
+                name = self._node.resolve_topic_name("gaze/look_at")
+                raise GraphError(
+                    f"nothing serves {name} after {wait_s:g} s: gaze_controller_node does, in sim.launch.py, "
+                    "rig.launch.py or by itself (same ROS_DOMAIN_ID and namespace?)"
+                )
+            self._spin_once()
+
+    def _spin_once(self) -> None:
+        self._executor.spin_once(timeout_sec=_SLICE_S)
+        if self._stop_asked.is_set():
+            raise _InterruptedError
+
+    def _spin_until(self, future: Any) -> Any:
+        while not future.done():
+            self._spin_once()
+            if not future.done() and not self._client.server_is_ready():
+                raise GraphError("gaze_controller_node has gone: the goal has no result")
+        return future.result()
+
+    def _on_feedback(self, message: Any) -> None:
+        feedback = message.feedback
+        residuals = (feedback.version_residual_deg, feedback.vergence_residual_deg, feedback.tilt_residual_deg)
+        self._progress.show(feedback.phase_name, feedback_line(feedback.phase_name, residuals, feedback.contrast))
+
+
+class _Progress:
+    """Lines of progress: on a terminal the last one is redrawn, elsewhere one is printed per phase."""
+
+    def __init__(self) -> None:
+        self._phase, self._open = "", False
+
+    def show(self, phase: str, line: str) -> None:
+        if sys.stdout.isatty():
+            start = "\r" if phase == self._phase else "\n" * self._open
+            print(f"{start}{line}\033[K", end="", flush=True)
+            self._open = True
+        elif phase != self._phase:
+            print(line, flush=True)
+        self._phase = phase
+
+    def end(self) -> None:
+        if self._open:
+            print(flush=True)
+        self._open = False
+
+
+def result_name(result: int) -> str:
+    """Return the name of a result in LookAt.action."""
+    names = (name for name in dir(LookAt.Result) if name.isupper() and getattr(LookAt.Result, name) == result)
+    return next(names, str(result))
+
+
+def _goal(request: LookRequest, time_limit_s: float) -> LookAt.Goal:
+    goal = LookAt.Goal(kind=getattr(LookAt.Goal, request.kind), time_limit_s=time_limit_s)
+    for name, value in request.fields.items():
+        setattr(goal, name, value)
+    if request.point_m is not None:
+        goal.point.x, goal.point.y, goal.point.z = request.point_m
+        goal.header.frame_id = request.frame
+    return goal

@@ -1,0 +1,29 @@
+"""A detected class as target: when to ask the tracker for what its boxes show."""
+
+import math
+
+from vergence_gaze.estimation.observations import BoxSighting
+from vergence_gaze.goals.goal import TrackRequest
+
+
+class RequestedClass:
+    """Asks the tracker for the object in boxes that count because the tracker does not show it.
+
+    Args:
+        goal_id: of the goal.
+        again_after_s: time after which the tracker is asked again if boxes still count.
+    """
+
+    def __init__(self, goal_id: int, again_after_s: float) -> None:
+        self.goal_id, self._again_after_s = goal_id, again_after_s
+        self._asked_s = -math.inf
+
+    def request(self, box: BoxSighting, now_s: float) -> TrackRequest | None:
+        """Return what to ask the tracker now that a box counts: its middle and size, in the left image of its pair."""
+        angles_rad = (box.left_azimuth_rad, box.left_elevation_rad)
+        sized = box.whole and math.isfinite(sum(angles_rad)) and min(box.extent_rad, box.extent_height_rad) > 0.0
+        if not sized or now_s - self._asked_s < self._again_after_s:
+            return None
+        self._asked_s = now_s
+        x, y = (math.tan(angle) for angle in angles_rad)
+        return TrackRequest(self.goal_id, box.stamp_s, True, (x, y), (box.extent_rad, box.extent_height_rad))

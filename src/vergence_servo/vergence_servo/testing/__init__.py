@@ -1,0 +1,1 @@
+"""Doubles of the hardware's lowest layer, for tests of several packages."""

@@ -1,0 +1,51 @@
+"""The samples of output in README are what its commands print."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+NUMBER = re.compile(r"[-+]?\d+\.\d+")
+TOLERANCE_PX = 0.5
+"""Versions of OpenCV and onnxruntime differ by less."""
+
+
+def sample() -> str:
+    """Return the block of README that begins with the detector's boxes."""
+    (block,) = re.findall(r"```\n(boxes: .*?)```", README, flags=re.DOTALL)
+    return str(block)
+
+
+def command() -> list[str]:
+    """Return the command line that README gives for it."""
+    (line,) = re.findall(r"^(vergence measure .* --model yolo\.onnx .*?) +#", README, flags=re.MULTILINE)
+    (given,) = re.findall(r"Try the last one with `(.*?)`", README.replace("\n", " "))
+    left, right, *options = shlex.split(given)
+    words = shlex.split(line)
+    return [*words[1:2], left, right, *options, *words[-2:]]
+
+
+def test_measuring_the_shipped_pair_prints_the_sample(tmp_path: Path) -> None:
+    pytest.importorskip("onnxruntime", reason="onnxruntime is not installed here")
+    arguments = command()
+    assert arguments[-2] == "--out"
+    arguments[-1] = str(tmp_path)
+    ran = subprocess.run(
+        [sys.executable, "-m", "vergence_bringup.command_line", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        cwd=ROOT,
+    )
+    assert ran.returncode == 0, ran.stderr
+    printed = ran.stdout[ran.stdout.index("boxes:") :].splitlines()[: len(sample().splitlines())]
+    text = "\n".join(printed) + "\n"
+    assert NUMBER.sub("#", text) == NUMBER.sub("#", sample())
+    values = [[float(number) for number in NUMBER.findall(part)] for part in (text, sample())]
+    assert values[0] == pytest.approx(values[1], abs=TOLERANCE_PX), f"README's sample is stale: it prints\n{text}"
+    assert (tmp_path / "boxes.png").is_file()
