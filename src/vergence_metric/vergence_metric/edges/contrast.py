@@ -57,7 +57,9 @@ def least_contrast(field: OrientedField, truncation_px: int) -> WindowContrast:
     """Return the least contrast of the windows of SMALL_WINDOWS_PX; NaN where none is measurable."""
     found, sizes_px = contrasts(field, truncation_px).both.tolist(), [window.size_px for window in field.windows]
     best = best_small_window(sizes_px, found)
-    return WindowContrast(math.nan, SMALL_WINDOWS_PX[0]) if best is None else WindowContrast(found[best], sizes_px[best])
+    return (
+        WindowContrast(math.nan, SMALL_WINDOWS_PX[0]) if best is None else WindowContrast(found[best], sizes_px[best])
+    )
 
 
 def contrasts(field: OrientedField, truncation_px: int) -> Contrasts:

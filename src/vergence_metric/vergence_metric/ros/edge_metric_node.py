@@ -84,9 +84,7 @@ class EdgeMetricNode(MetricNode):
         self._measurement.update_alignment()
         self._failure = None
 
-    def _publish_fovea(
-        self, edge: EdgeMetricResult, models: Models | None, header: Header, pair_skew_s: float
-    ) -> None:
+    def _publish_fovea(self, edge: EdgeMetricResult, models: Models | None, header: Header, pair_skew_s: float) -> None:
         with self._times.measure("disparity"):
             disparity = self._measurement.disparity(edge)
         angular = models and angular_disparity(
