@@ -84,6 +84,26 @@ def hard(count: int, seed: int, reach_px: float) -> Iterator[Pair]:
         yield Pair(left, view(grey, rng, shift_px, 2.0 * sign, sign, 1.3, 8.0), shift_px)
 
 
+def thin(count: int, seed: int) -> Iterator[Pair]:
+    """Yield upright rods 5 to 15 px wide before a textured background, banded or plain, with noise of deviation 2."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        background, d = texture(rng), float(rng.uniform(-100, 100))
+        behind = d - float(rng.uniform(15, 120))
+        half, slant = 0.5 * float(rng.uniform(5, 15)), float(rng.uniform(-0.1, 0.1))
+        along = cv2.GaussianBlur(rng.standard_normal((HEIGHT, 1), np.float32), (0, 0), float(rng.uniform(0.6, 6.0)))
+        rod = rng.uniform(30, 220) + rng.uniform(5, 50) * along / along.std()
+        images = []
+        for shift_px, ground_px in ((0.0, 0.0), (d, behind)):
+            y, x = np.mgrid[0:HEIGHT, 0:WIDTH].astype(np.float32)
+            off = x - (WIDTH - 1) / 2 + shift_px - slant * (y - (HEIGHT - 1) / 2)
+            inside = np.clip(half + 0.5 - np.abs(off), 0.0, 1.0)
+            shaded = rod - 20.0 * np.square(off / half).clip(0.0, 1.0)
+            ground = view(background, rng, ground_px).astype(np.float32)
+            images.append(_digitised(inside * shaded + (1.0 - inside) * ground, rng, 2.0))
+        yield Pair(images[0], images[1], d)
+
+
 def deceptive(count: int, seed: int) -> Iterator[tuple[str, Pair]]:
     """Yield (kind, pair) in turn: blank walls, repeated textures, unrelated views, one eye covered."""
     rng = np.random.default_rng(seed)

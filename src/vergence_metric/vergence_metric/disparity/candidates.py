@@ -20,6 +20,7 @@ _REPEATS = 0.93  # self-correlation of a repeated texture without noise
 _CLEAR = 3.0  # signal over noise from which a window can tell a repetition
 _WIDER = (2.0, 4.0)  # times the largest window
 _MOST_DEVIATIONS = 12.0
+_COLUMN_PX, _COLUMN_ROWS_PX = (2.5, 12.0), 2  # deviations of the tall window across and down, rows searched either way
 _UNEXPLAINED = 0.1  # share of the variance that half resolution may leave unexplained of an exact repetition
 _VERTICAL_COST = 0.05  # per pixel, in logarithms of what is unexplained: rows are roughly aligned
 
@@ -87,6 +88,22 @@ def _profile(pair: FoveaPair, window_px: float, parameters: DisparityParameters)
     values = np.where(visible, surface.profile, -1.0).astype(np.float32)
     textured = surface.texture.signal >= parameters.min_texture
     return Profile(window_px, scale, surface.first_d * scale, values, textured, surface)
+
+
+def column(pair: FoveaPair, vertical_px: int, span_px: tuple[int, int], parameters: DisparityParameters) -> Profile:
+    """Correlate a tall, narrow window: the pixels of a thin upright thing, without what lies beside it.
+
+    Every other window mixes a pen, a pole or a cable with its background. `span_px` are the first and the last
+    disparity, `vertical_px` is that of the surroundings.
+    """
+    at = (round(pair.point_px[0]), round(pair.point_px[1]))
+    rows = (vertical_px - _COLUMN_ROWS_PX, vertical_px + _COLUMN_ROWS_PX)
+    surface = correlate(*pair.full, at, _COLUMN_PX[0], span_px, rows, down=_COLUMN_PX[1])
+    x = pair.point_px[0] - (surface.first_d + np.arange(surface.zncc.shape[1]))
+    visible = (x >= 0) & (x <= pair.left.shape[1] - 1)
+    values = np.where(visible, surface.profile, -1.0).astype(np.float32)
+    textured = surface.texture.signal >= parameters.min_texture
+    return Profile(_COLUMN_PX[0], 1, surface.first_d, values, textured, surface)
 
 
 def vertical_px(layers: Sequence[Profile]) -> int:

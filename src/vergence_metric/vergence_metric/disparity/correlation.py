@@ -27,32 +27,37 @@ def radius_of(sigma: float) -> int:
 
 
 @lru_cache(maxsize=32)
-def _window(sigma: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the Gaussian in one dimension as (n, 1) and in two as (n, n); both sum to 1."""
+def _line(sigma: float) -> NDArray[np.float32]:
+    """Return the Gaussian in one dimension as (n, 1); it sums to 1."""
     radius = radius_of(sigma)
     line = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    line /= line.sum()
-    return line[:, None].astype(np.float32), np.outer(line, line).astype(np.float32)
+    return (line / line.sum())[:, None].astype(np.float32)
 
 
 @lru_cache(maxsize=32)
-def _down(sigma: float, rows: int) -> NDArray[np.float32]:
+def _window(across: float, down: float) -> NDArray[np.float32]:
+    """Return the Gaussian in two dimensions, (rows, columns); it sums to 1."""
+    return np.asarray(_line(down) @ _line(across).T, np.float32)
+
+
+@lru_cache(maxsize=32)
+def _columns(sigma: float, rows: int) -> NDArray[np.float32]:
     """Return the matrix (rows - 2 * radius, rows) that filters columns by the Gaussian, where all of it is inside."""
-    line, radius = _window(sigma)[0][:, 0], radius_of(sigma)
+    line, radius = _line(sigma)[:, 0], radius_of(sigma)
     matrix = np.zeros((rows - 2 * radius, rows), np.float32)
     for row in range(len(matrix)):
         matrix[row, row : row + len(line)] = line
     return matrix
 
 
-def _windowed_mean(strip: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
+def _windowed_mean(strip: NDArray[np.float32], across: float, down: float) -> NDArray[np.float32]:
     """Return the weighted mean of the window about every pixel of a strip (h, w) whose window is inside.
 
     A strip is little higher than a window: columns first, only where a window fits, is a fifth of the work of a filter
     of the whole strip. The product is too small for BLAS to use threads.
     """
-    radius = radius_of(sigma)
-    filtered = cv2.filter2D(_down(sigma, strip.shape[0]) @ strip, cv2.CV_32F, _window(sigma)[0].T)
+    radius = radius_of(across)
+    filtered = cv2.filter2D(_columns(down, strip.shape[0]) @ strip, cv2.CV_32F, _line(across).T)
     return np.asarray(filtered[:, radius:-radius], np.float32)
 
 
@@ -124,9 +129,9 @@ def parabola(before: float, at: float, after: float) -> float:
     return 0.0 if bend >= -1e-9 else float(np.clip(0.5 * (float(before) - float(after)) / bend, -0.5, 0.5))
 
 
-def texture_of(patch: NDArray[np.float32], sigma: float) -> Texture:
-    """Measure the texture of a window's patch (n, n) with n = 2 * radius_of(sigma) + 1."""
-    weights = _window(sigma)[1]
+def texture_of(patch: NDArray[np.float32], across: float, down: float) -> Texture:
+    """Measure the texture of a window's patch; its sides are 2 * radius_of(sigma) + 1 of the sigma in their way."""
+    weights = _window(across, down)
     centred = patch - _sum(weights, patch)
     variance = _sum(weights, centred * centred)
     # Strong texture raises Immerkaer's mean of absolute values; the median only follows what most pixels do.
@@ -140,18 +145,21 @@ def texture_of(patch: NDArray[np.float32], sigma: float) -> Texture:
     floor = 1e-6
     along = [max(_sum(weights, g * g) - noise**2 / 2, floor) for g in (gx, gy)]
     signal = max(variance - noise**2, floor)
-    lengths = [min(max(math.sqrt(signal / g), 1.0), 2.0 * sigma) for g in along]
-    return Texture(math.sqrt(variance), noise, 4.0 * sigma**2 / (lengths[0] * lengths[1]), lengths[0])
+    sigmas = across, down
+    lengths = [min(max(math.sqrt(signal / g), 1.0), 2.0 * sigma) for g, sigma in zip(along, sigmas, strict=True)]
+    independent = 4.0 * across * down / (lengths[0] * lengths[1])
+    return Texture(math.sqrt(variance), noise, independent, lengths[0])
 
 
 def texture_about(source: Strip, at: tuple[int, int], sigma: float) -> Texture:
     """Measure the texture of the window about a point (x, y) at the strip's resolution."""
-    return texture_of(_patch(source, at, radius_of(sigma)), sigma)
+    radius = radius_of(sigma)
+    return texture_of(_patch(source, at, radius, radius), sigma, sigma)
 
 
-def _patch(source: Strip, at: tuple[int, int], radius: int) -> NDArray[np.float32]:
+def _patch(source: Strip, at: tuple[int, int], across: int, down: int) -> NDArray[np.float32]:
     x, y = at[0] - int(source.x0), at[1] - int(source.y0)
-    return source.grey[y - radius : y + radius + 1, x - radius : x + radius + 1]
+    return source.grey[y - down : y + down + 1, x - across : x + across + 1]
 
 
 def correlate(
@@ -162,6 +170,7 @@ def correlate(
     d_range: tuple[int, int],
     v_range: tuple[int, int],
     sign: int = -1,
+    down: float = 0.0,
 ) -> Surface:
     """Correlate the window about a point of one eye with the other eye's, for every whole shift in a range.
 
@@ -169,28 +178,29 @@ def correlate(
         source: the eye whose point is asked for.
         other: the eye that is searched.
         at: (x, y) of the point in `source`, at the strips' resolution.
-        sigma: of the Gaussian window, in pixels of this resolution.
+        sigma: of the Gaussian window, in pixels of this resolution; across, if there is one for the way down.
         d_range: first and last horizontal disparity, inclusive.
         v_range: first and last vertical disparity, inclusive.
         sign: -1 from left to right (x_right = x_left - d), +1 from right to left.
+        down: of the window in the way down; 0 for one as high as wide.
 
     Returns:
         Surface of shape (v_last - v_first + 1, d_last - d_first + 1).
 
     """
-    radius = radius_of(sigma)
-    weights = _window(sigma)[1]
-    patch = _patch(source, at, radius)
-    texture = texture_of(patch, sigma)
+    down = down or sigma
+    rx, ry, weights = radius_of(sigma), radius_of(down), _window(sigma, down)
+    patch = _patch(source, at, rx, ry)
+    texture = texture_of(patch, sigma, down)
     kernel = weights * (patch - _sum(weights, patch))
 
     xs = sorted(at[0] + sign * d for d in d_range)
     ys = sorted(at[1] + sign * v for v in v_range)
-    top, first = ys[0] - int(other.y0) - radius, xs[0] - int(other.x0) - radius
-    strip = other.grey[top : ys[1] - int(other.y0) + radius + 1, first : xs[1] - int(other.x0) + radius + 1]
+    top, first = ys[0] - int(other.y0) - ry, xs[0] - int(other.x0) - rx
+    strip = other.grey[top : ys[1] - int(other.y0) + ry + 1, first : xs[1] - int(other.x0) + rx + 1]
     strip = strip - float(strip.mean())  # keeps the float32 sum of squares exact enough
     product = cv2.matchTemplate(strip, kernel, cv2.TM_CCORR)
-    mean, square = _windowed_mean(strip, sigma), _windowed_mean(strip * strip, sigma)
+    mean, square = _windowed_mean(strip, sigma, down), _windowed_mean(strip * strip, sigma, down)
     # One grey level squared on both sides: flat areas correlate to nothing instead of to noise.
     variance = np.maximum(square - mean * mean, 0.0) + 1.0
     zncc = product / np.sqrt(variance * (texture.deviation**2 + 1.0))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.disparity.affine import Fit, grow
-from vergence_metric.disparity.candidates import Profile, profiles, repetitions, vertical_px
+from vergence_metric.disparity.candidates import Profile, column, profiles, repetitions, vertical_px
 from vergence_metric.disparity.correlation import radius_of
 from vergence_metric.disparity.fovea_pair import FoveaPair
 from vergence_metric.disparity.lighting import lit_alike
@@ -44,7 +44,7 @@ _FURTHEST_PX, _VAGUE_PX = 0.75, 0.12  # a fit further from the plane of its surf
 _LEAST_DEVIATIONS = -1.0  # below what chance gives, for the strip's smoothness speaks for a point too
 _SURE_DEVIATIONS = 0.5  # but a strip looks smooth whatever it shows: sure is only what does better than chance
 _LEAST_DEVIATIONS_FLAT = 1.0  # where only one window has texture: a wall's shading is smooth, and matches anywhere
-_LEAST_CONFIDENCE = 0.2
+_LEAST_CONFIDENCE = 0.3
 _UNSURE = 0.5  # confidence of what is more likely wrong than right, at most
 _MOST_REPEATED = 4
 
@@ -99,6 +99,9 @@ class PointMatching:
         self._vertical = vertical_px(layers)
         self._right = lit_alike(pair, layers, LARGEST_HALF_PX + abs(self._vertical))
         guess, self._span = self._about_coarse() if expected_px is None else self._about(expected_px)
+        reach = parameters.max_px
+        searched = (-reach, reach) if expected_px is None else self._span
+        self._column = column(pair, self._vertical, (max(searched[0], -reach), min(searched[1], reach)), parameters)
         self._fine = fine(pair.left, self._right, pair.point_px, self._vertical, self._span)
         self.choices = self._choices(guess)
         """The candidates, as found."""
@@ -160,7 +163,7 @@ class PointMatching:
 
         By `least` standard deviations in some window, or by its own pixels alone.
         """
-        found = [layer.deviations(choice.disparity_px) for layer in self._layers if layer.textured]
+        found = [layer.deviations(choice.disparity_px) for layer in (*self._layers, self._column) if layer.textured]
         if len(found) == 1:
             return choice.score > 0.0 and found[0] >= _LEAST_DEVIATIONS_FLAT
         return choice.score > 0.0 and (max(found) >= least or evidence.own_pixels_decide)
@@ -192,6 +195,8 @@ class PointMatching:
         for layer in self._layers:
             if layer.textured:
                 named += [(float(d), f"window of {layer.window_px:g} px") for d in layer.peaks[:_PEAKS]]
+        if self._column.textured:
+            named += [(float(d), "tall window") for d in self._column.peaks[:_PEAKS]]
         about = self._fine.about(*self._at, _NEAR_PX), self._fine.about(*self._at, _WIDE_PX)
         found: list[Choice] = []
         for d, name in named:
@@ -209,11 +214,13 @@ class PointMatching:
 
     def _support(self, d: float, near: NDArray[np.float32], wide: NDArray[np.float32]) -> Support:
         correlations = [max(layer.at(d), 0.0) for layer in self._layers if layer.textured]
+        correlation = sum(correlations) / len(correlations)
         return Support(
-            correlation=sum(correlations) / len(correlations),
+            correlation=correlation,
             agrees=float(abs(self._fine.at(*self._at) - d) <= _SAME_PX),
             near_share=_share(near, d),
             wide_share=_share(wide, d),
+            column=max(self._column.at(d), 0.0) if self._column.textured else correlation,
         )
 
     def _matched_back(self, d: float) -> float:

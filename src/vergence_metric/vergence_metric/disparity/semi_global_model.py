@@ -6,13 +6,13 @@
 import math
 from dataclasses import astuple, dataclass
 
-CHOICE = (-2.68, 1.79, 0.89, 3.73, 1.48)
+CHOICE = (-2.60, -0.65, 1.14, 3.83, 0.24, 3.15)
 """Conditional logit of a candidate against none: bias, then the weights of `Support` in its order."""
 
-CONFIDENCE = (-5.73, 0.72, 1.48, -0.02, 1.24, 2.29, -0.52, -0.48)
+CONFIDENCE = (-6.64, 0.93, 1.61, 0.05, 0.84, 2.00, -0.54, -0.56)
 """Logistic model of an error of at most 2 px: bias, then the weights of `Evidence.terms`."""
 
-SIGMA = (1.21, 0.75, 0.40)
+SIGMA = (1.03, 0.68, 0.41)
 """Log-linear quantile of the error that two deviations hold, halved: bias, then the weights of `Evidence.scales`."""
 
 _BACK_PX = 2.0
@@ -28,13 +28,15 @@ class Support:
     """What speaks for a candidate before it is measured, from 0 to 1 each.
 
     `correlation` is the mean over the windows with texture; the others say whether the strip's matching gives the
-    point this disparity, and to which share of the pixels near and around it.
+    point this disparity, and to which share of the pixels near and around it; `column` is the tall window's
+    correlation, that of the others where it has no texture.
     """
 
     correlation: float
     agrees: float
     near_share: float
     wide_share: float
+    column: float
 
 
 @dataclass(frozen=True)
