@@ -41,7 +41,7 @@ def run(say: Callable[[str], None], clicks: int | None = None) -> list[Row]:
         say(f"clicks on photographs skipped: {error}")
         return _scene_rows(say) + _disparity_rows(say, from_photographs=False)
     trials = photos_figures.trials(clicks)
-    outcomes = _outcomes(run_trial, trials, _TRIALS_OF_A_JOB, "clicks on photographs", say)
+    outcomes = outcomes_of(run_trial, trials, _TRIALS_OF_A_JOB, "clicks on photographs", say)
     for line in (*photos_figures.by_pair(outcomes), "", *photos_figures.reasons(outcomes)):
         say(line)
     rows = photos_figures.rows(outcomes, clicks) + _scene_rows(say) + photos_contrast.rows()
@@ -50,13 +50,13 @@ def run(say: Callable[[str], None], clicks: int | None = None) -> list[Row]:
 
 def _scene_rows(say: Callable[[str], None]) -> list[Row]:
     of_a_room = sum(photos_scenes.CLICKS_OF_A_ROOM.values())
-    outcomes = _outcomes(photos_scenes.run, photos_scenes.trials(), of_a_room, "clicks in rooms", say)
+    outcomes = outcomes_of(photos_scenes.run, photos_scenes.trials(), of_a_room, "clicks in rooms", say)
     for line in photos_scenes.failures(outcomes):
         say(line)
     return photos_scenes.rows(outcomes)
 
 
-def _outcomes(
+def outcomes_of(
     run_one: Callable[[Trial], Outcome], trials: Sequence[Trial], of_a_job: int, what: str, say: Callable[[str], None]
 ) -> list[Outcome]:
     """Run every trial in one of two processes, `of_a_job` after one another in the same: they share what it keeps."""

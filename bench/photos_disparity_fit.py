@@ -134,7 +134,7 @@ def look(case: Case, parameters: DisparityParameters) -> Seen | None:
         np.array([astuple(one.support) for one in matching.choices]),
         np.array([abs(one.disparity_px - case.disparity_px) <= _RIGHT_PX for one in matching.choices]),
         [evidence for evidence, *_ in measured],
-        np.array([horizontal - case.disparity_px for _, horizontal, _ in measured]),
+        np.array([horizontal - case.disparity_px for _, horizontal, *_ in measured]),
         [
             matching.beyond_chance(one, evidence) and not matching.repeated(one)
             for one, (evidence, *_) in zip(matching.choices, measured, strict=True)

@@ -26,7 +26,6 @@ from vergence_gaze.ros import gaze_messages
 from vergence_metric.disparity.angular_disparity import angular_disparity
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import PairMeasurementParameters
-from vergence_metric.ros.edge_messages import edge_message, error_message
 from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_rig.camera import CameraModel
 from vergence_rig.joint_history import JointHistory
@@ -103,11 +102,6 @@ class MetricOfPairs:
         skew_s = right_stamp_s - left_stamp_s
         measurement, models = self._measurement, self._models
         edge = measurement.edge(left, right)
-        disparity = measurement.disparity(edge)
-        angular = angular_disparity(*models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px)
-        error = error_message(disparity, angular, header, skew_s)
-        verged = measurement.verged(edge, error.horizontal_px, error.confidence)
-        edges = edge_message(edge, verged, header, skew_s)
         now_ns = _ns(left_stamp_s)
         eyes = self._joints.at(now_ns, _ns(right_stamp_s))
         passed = self._joints.samples_between(now_ns - _LOOK_BACK_NS, now_ns)
@@ -116,7 +110,7 @@ class MetricOfPairs:
         tracked = track_message(track, edge, angular, header, skew_s)
         measurement.update_alignment()
         return [
-            gaze_messages.edge_contrast(edges),
+            gaze_messages.track_contrast(tracked),
             gaze_messages.track_sighting(tracked, models[0]),
         ]
 
@@ -156,9 +150,9 @@ class Lockstep:
             GoalKind.PIXEL,
             left_eye=True,
             left_xy=(float(x), float(y)),
-            stamp_s=_clock_s(self.newest_published_s),
+            stamp_s=clock_s(self.newest_published_s),
         )
-        return self.controller.look_at(goal, _clock_s(self.world.time_s))
+        return self.controller.look_at(goal, clock_s(self.world.time_s))
 
     def _world_event(self) -> None:
         due_s = self._schedule.next_due_s()
@@ -170,8 +164,8 @@ class Lockstep:
         world.advance_to(event.due_s)
         if event.kind == "joints":
             report = world.joint_states()
-            self.metric.on_joints(_clock_s(event.due_s), report)
-            self._arrive(event.due_s + JOINT_REPORT_S, [JointReport(_clock_s(event.due_s), dict(report))])
+            self.metric.on_joints(clock_s(event.due_s), report)
+            self._arrive(event.due_s + JOINT_REPORT_S, [JointReport(clock_s(event.due_s), dict(report))])
             return
         publish_s = event.due_s + world.parameters.camera.latency_s
         self._schedule.publish(event.eye, publish_s, (event.due_s, world.expose(event.eye)))
@@ -183,7 +177,7 @@ class Lockstep:
         if not all(self._frames.values()):
             return
         (left_s, left), (right_s, right) = (self._frames[e].pop(0) for e in EYES)
-        seen = self.metric.observe(left, right, _clock_s(left_s), _clock_s(right_s))
+        seen = self.metric.observe(left, right, clock_s(left_s), clock_s(right_s))
         published_s = max(left_s, right_s) + self.world.parameters.camera.latency_s
         self._arrive(published_s + PROCESSING_S, seen, left_s)
 
@@ -197,7 +191,7 @@ class Lockstep:
             _, _, seen, exposed_s = heapq.heappop(self._arrivals)
             arrived += seen
             self.newest_exposure_s = max(self.newest_exposure_s, exposed_s)
-        command = self.controller.step(_clock_s(now_s), arrived)
+        command = self.controller.step(clock_s(now_s), arrived)
         if command.track_request is not None:
             self.metric.on_request(command.track_request)
         if command.joints_rad is not None:
@@ -242,7 +236,8 @@ def _model(lens: Lens) -> CameraModel:
     return CameraModel.from_camera_info_values(camera.width_px, camera.height_px, matrix, lens.distortion)
 
 
-def _clock_s(world_s: float) -> float:
+def clock_s(world_s: float) -> float:
+    """Return a time of the world on the clock of the stamps [s]."""
     return _CLOCK_START_S + world_s
 
 

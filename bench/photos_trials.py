@@ -78,13 +78,13 @@ class Trial:
     imperfect: bool = True
 
 
-def run(trial: Trial) -> Outcome:
+def run(trial: Trial, make_lockstep: Callable[[PhotoWorld, Rig], Lockstep] = Lockstep) -> Outcome:
     """Run a trial."""
-    trace, rig, outside_share = trace_of(trial)
+    trace, rig, outside_share = trace_of(trial, make_lockstep)
     return outcome_of(trial, trace, rig, outside_share)
 
 
-def trace_of(trial: Trial) -> tuple[Trace, Rig, float]:
+def trace_of(trial: Trial, make_lockstep: Callable[[PhotoWorld, Rig], Lockstep] = Lockstep) -> tuple[Trace, Rig, float]:
     """Run a trial and return its trace, the rig that was described, and the share of padding in the view at the end."""
     cv2.setNumThreads(1)
     described, plant_of = SETTINGS[trial.setting]
@@ -101,7 +101,7 @@ def trace_of(trial: Trial) -> tuple[Trace, Rig, float]:
         for name, servo in play.items()
     }
     world.head.place(start_of(world, pair, point), 0.0, aside)
-    lockstep = Lockstep(world, rig)
+    lockstep = make_lockstep(world, rig)
     lockstep.advance_to(AWAKE_S + float(random.uniform(0.0, 1.0 / parameters.camera.frame_rate_hz)))
     trace = record(lockstep, PointOfPhotograph(world, point), DURATION_S, REST_S)
     return trace, rig, max(world.outside_share(eye) for eye in EYES)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from vergence_bringup.command_line import COMMANDS
-from vergence_bringup.node_table import NODES
+from vergence_bringup.node_table import HOSTS, NODES
 
 ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("rclpy", "numpy", "cv2", "yaml", "mujoco")
@@ -38,7 +38,7 @@ def start(place: str, *path: Path) -> "subprocess.Popen[str]":
 
 
 def test_every_executable_imports_late() -> None:
-    assert NODES.keys() | {"list_cameras", "calibrate_servos"} == entry_points().keys()
+    assert NODES.keys() | HOSTS.keys() | {"list_cameras", "calibrate_servos"} == entry_points().keys()
 
 
 @pytest.mark.parametrize("place", entry_points().values(), ids=entry_points().keys())

@@ -26,6 +26,7 @@ setup(
     entry_points={
         "console_scripts": [
             "vergence = vergence_bringup.command_line:main",
+            "head_node = vergence_bringup.executables:head_node",
         ]
     },
 )

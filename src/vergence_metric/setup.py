@@ -21,6 +21,7 @@ setup(
             "edge_metric_node = vergence_metric.executables:edge_metric_node",
             "box_metric_node = vergence_metric.executables:box_metric_node",
             "eye_rotation_node = vergence_metric.executables:eye_rotation_node",
+            "stereo_node = vergence_metric.executables:stereo_node",
         ]
     },
 )

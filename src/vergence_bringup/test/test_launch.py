@@ -65,6 +65,12 @@ def nodes(file, **arguments):
     return [(node.node_executable, parameters(node, context)) for node in found]
 
 
+def test_composed_is_one_process_with_the_same_choice_of_nodes():
+    names = {name for name, _ in nodes("rig.launch.py", **CAMERAS, composed="true")}
+    assert "head_node" in names
+    assert "head_node" not in {name for name, _ in nodes("rig.launch.py", **CAMERAS)}
+
+
 def parameters(node, context):
     """Return a node's parameters beyond its YAML file. Launch has no public way to read them."""
     values: dict[str, object] = {}

@@ -35,6 +35,15 @@ NODES: dict[str, NodeEntry] = {
 }
 
 
+HOSTS: dict[str, str] = {"head_node": "vergence_bringup", "stereo_node": "vergence_metric"}
+"""Executables that run several of these nodes in one process, and the package of each; they have no parameters."""
+
+
+def package_of(executable: str) -> str:
+    """Return the package of a node or of a host of nodes."""
+    return HOSTS[executable] if executable in HOSTS else NODES[executable].package
+
+
 def graph(head: str) -> tuple[str, ...]:
     """Return the executables of the whole graph of a REAL, a SIMULATED or a PHOTOGRAPHED head."""
     return tuple(executable for executable, entry in NODES.items() if head in entry.heads)

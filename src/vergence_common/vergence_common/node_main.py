@@ -1,5 +1,6 @@
 """The one way in which every node starts, spins and ends."""
 
+import contextlib
 import os
 import pwd
 import signal
@@ -10,9 +11,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
+from vergence_common.blas_threads import limit_blas_threads
+from vergence_common.executor import make_executor, spin
 from vergence_common.memory import keep_large_blocks
 
 STATUS_BAD_INPUT = 2
@@ -23,13 +25,20 @@ class StartAbandonedError(Exception):
 
 
 def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -> int:
-    """Make a node, spin it on one thread until SIGINT, SIGTERM or shutdown, close it, and return the exit status.
+    """Make a node and run it to its end; see `run_nodes`."""
+    return run_nodes([make_node], args)
 
-    The node's own `close()`, where it has one, releases hardware and joins its threads. A ValueError while the node
+
+def run_nodes(makers: Sequence[Callable[[], Node]], args: Sequence[str] | None = None) -> int:
+    """Make nodes in this order, spin them on one thread until SIGINT, SIGTERM or shutdown, and close them.
+
+    A node's own `close()`, where it has one, releases hardware and joins its threads. A ValueError while the node
     is made (a wrong parameter, rig or calibration) is one line on standard error and status 2; so is a parameter file
-    that cannot be read. A clean end is status 0, also of a node that ends while it is being made.
+    that cannot be read. A clean end is status 0, also of a node that ends while it is being made. They are closed in
+    the order in which they were made: the sources first.
     """
     keep_large_blocks()
+    limit_blas_threads()
     _ensure_home()
     stop_asked = threading.Event()
     # Under rclpy's own handlers, which shut the context down, Python's would also raise KeyboardInterrupt in the middle
@@ -40,31 +49,32 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -
         rclpy.init(args=list(args) if args is not None else None)
     except Exception as error:
         return _bad_input(error)
-    node: Node | None = None
+    nodes: list[Node] = []
     try:
         if stop_asked.is_set():
             return 0
         # The executor is made first: after a shutdown its constructor would log an error.
-        executor = SingleThreadedExecutor()
-        node = make_node()
-        executor.add_node(node)
-        executor.spin()
+        executor = make_executor()
+        for make_node in makers:
+            if stop_asked.is_set():
+                return 0
+            nodes.append(make_node())
+            executor.add_node(nodes[-1])
+        spin(executor, rclpy.get_default_context())
     except StartAbandonedError:
         # Its thread holds no hardware; waiting for it, or tearing the interpreter down beside it, would be wrong.
         rclpy.try_shutdown()
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(0)
-    except ExternalShutdownException:
-        pass
     except Exception as error:
         if stop_asked.is_set() or not rclpy.ok():
             return 0  # the context was shut down meanwhile: the failure is its consequence
-        if node is None and isinstance(error, (ValueError, OSError)):
+        if len(nodes) < len(makers) and isinstance(error, (ValueError, OSError)):
             return _bad_input(error)
         raise
     finally:
-        _close(node)
+        _close(nodes)
     return 0
 
 
@@ -84,15 +94,15 @@ def _bad_input(error: Exception) -> int:
     return STATUS_BAD_INPUT
 
 
-def _close(node: Node | None) -> None:
+def _close(nodes: Sequence[Node]) -> None:
     # A second Ctrl-C must not leave hardware half released.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    try:
-        if node is not None:
+    with contextlib.ExitStack() as closing:
+        # A stack ends with what was put on it first; whatever fails, the others are closed too.
+        closing.callback(rclpy.try_shutdown)
+        for node in reversed(nodes):
+            closing.callback(node.destroy_node)
             close = getattr(node, "close", None)
             if close is not None:
-                close()
-            node.destroy_node()
-    finally:
-        rclpy.try_shutdown()
+                closing.callback(close)

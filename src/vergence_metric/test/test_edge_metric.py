@@ -116,10 +116,34 @@ def test_the_right_image_is_aligned_before_it_is_compared() -> None:
     np.testing.assert_allclose(aligned.right_grey[100:380, 100:540], left[100:380, 100:540], atol=30)
 
 
-def test_every_stage_is_timed() -> None:
+def test_every_stage_is_timed_once_it_is_measured() -> None:
     found = measured(picture(1, 480, 640), picture(2, 480, 640))
-    assert set(found.stage_s) == {"grey", "align", "edges", "distance", "chance", "contrast"}
+    assert set(found.stage_s) == {"grey", "align", "edges", "contrast"}
+    assert found.left_to_right_px.size == found.chance_left_to_right_px.size
+    assert set(found.stage_s) >= {"distance", "chance"}
+    assert "robust" not in found.stage_s
     assert all(seconds > 0.0 for seconds in found.stage_s.values())
+
+
+@pytest.mark.parametrize("windows_px", [(50, 100, 150, 200), (150, 60), (300,), (40, 70)])
+def test_the_least_contrast_is_that_of_the_small_windows(windows_px: tuple[int, ...]) -> None:
+    scene = picture(5)
+    found = measured(scene[:480, 10:650], scene[:480, :640], EdgeParameters(windows_px=windows_px))
+    small = [contrast for size, contrast in zip(windows_px, found.contrast, strict=True) if 50 <= size <= 150]
+    if small:
+        assert found.least_contrast.contrast == min(small)
+        assert found.least_contrast.window_px == windows_px[found.contrast.tolist().index(min(small))]
+    else:
+        assert math.isnan(found.least_contrast.contrast)
+
+
+def test_a_result_is_not_changed_by_the_next_pair() -> None:
+    metric = EdgeMetric(alignment=AlignmentParameters(mode="none"))
+    first = metric.measure(picture(1, 480, 640), picture(2, 480, 640))
+    metric.measure(picture(3, 480, 640), picture(4, 480, 640))
+    alone = measured(picture(1, 480, 640), picture(2, 480, 640))
+    for name in ("left_to_right_px", "chance_right_to_left_px", "contrast", "robust_left_to_right_px"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(alone, name))
 
 
 def grey(path: Path) -> Grey:

@@ -16,3 +16,8 @@ def box_metric_node() -> int:
 def eye_rotation_node() -> int:
     """Run eye_rotation_node."""
     return run("vergence_metric.ros.eye_rotation_node")
+
+
+def stereo_node() -> int:
+    """Run stereo_node."""
+    return run("vergence_metric.ros.stereo_node")

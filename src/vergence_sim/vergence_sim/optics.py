@@ -1,6 +1,7 @@
 """A cheap webcam's imperfections: motion blur, lens distortion, exposure, white balance, noise, JPEG."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import cv2
@@ -86,9 +87,11 @@ class Sensor:
     def __init__(self, rng: np.random.Generator, shape: tuple[int, int], right: bool) -> None:
         self._rng = rng
         self._right = right
-        height, width = shape
-        self._bank = rng.standard_normal((_NOISE_BANK, height, width, 3), dtype=np.float32)
-        self._noise: tuple[Image, Image] | None = None
+        self._shape = shape
+        self._before_noise = rng.bit_generator.state
+        for _ in _fields(rng, shape):
+            pass  # the generator goes on as if the fields were kept, which would take a hundred megabytes
+        self._noise: list[tuple[Image, Image]] = []
         self._noise_sigma = -1.0
         self._table: npt.NDArray[np.uint8] | None = None
         self._gains = (-1.0, -1.0, -1.0)
@@ -117,18 +120,28 @@ class Sensor:
 
     def _noisy(self, image: Image, sigma: float) -> Image:
         if sigma != self._noise_sigma:
-            levels = np.clip(np.rint(self._bank * sigma), -255, 255)
-            # Positive and negative parts as bytes, each field tiled twice: a shift is a slice, an addition one call.
-            brighter, darker = np.maximum(levels, 0), np.maximum(-levels, 0)
-            self._noise = _twice(brighter), _twice(darker)
+            again = np.random.default_rng()
+            again.bit_generator.state = self._before_noise
+            self._noise = [_parts(field * sigma) for field in _fields(again, self._shape)]
             self._noise_sigma = sigma
-        assert self._noise is not None
         # A new field for every frame would cost more than rendering: take a random one at a random shift.
-        field = int(self._rng.integers(_NOISE_BANK))
+        brighter, darker = self._noise[int(self._rng.integers(_NOISE_BANK))]
         row = int(self._rng.integers(image.shape[0]))
-        brighter, darker = (part[field, row : row + image.shape[0]] for part in self._noise)
-        return np.asarray(cv2.subtract(cv2.add(image, brighter), darker), np.uint8)
+        noisy, first = np.empty_like(image), image.shape[0] - row
+        for there, taken in ((slice(0, first), slice(row, None)), (slice(first, None), slice(0, row))):
+            if row or there.start == 0:
+                cv2.add(image[there], brighter[taken], dst=noisy[there])
+                cv2.subtract(noisy[there], darker[taken], dst=noisy[there])
+        return noisy
 
 
-def _twice(fields: npt.NDArray[np.floating]) -> Image:
-    return np.tile(fields.astype(np.uint8), (1, 2, 1, 1))
+def _fields(rng: np.random.Generator, shape: tuple[int, int]) -> Iterator[npt.NDArray[np.float32]]:
+    """Yield the fields of noise of deviation 1, one at a time."""
+    for _ in range(_NOISE_BANK):
+        yield rng.standard_normal((*shape, 3), dtype=np.float32)
+
+
+def _parts(levels: npt.NDArray[np.float32]) -> tuple[Image, Image]:
+    """Return the positive and the negative part of a noise as bytes: an addition is then one call each."""
+    rounded = np.clip(np.rint(levels), -255, 255)
+    return np.maximum(rounded, 0).astype(np.uint8), np.maximum(-rounded, 0).astype(np.uint8)

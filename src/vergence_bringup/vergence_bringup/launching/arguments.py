@@ -90,6 +90,9 @@ _CAMERAS_AND_VISION = (
     _switch("detector", "run box_metric_node; it needs onnxruntime", "false"),
     _file("model", "ONNX file of the detector; empty for the one of the simulator's cube"),
     _switch("lock", "hold one exposure and white balance for both cameras", "true"),
+    _switch(
+        "composed", "run all nodes in one process, head_node: images pass in memory, which saves CPU time", "false"
+    ),
     _ENCODER,
     _FRAMES,
     _PROFILE,

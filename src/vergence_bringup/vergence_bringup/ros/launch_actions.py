@@ -4,7 +4,7 @@ Needs `launch`, which comes with ROS from apt: only the launch files import this
 """
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from vergence_bringup.launching.arguments import ARGUMENTS, problems, unknown
 from vergence_bringup.launching.endings import ending
 from vergence_bringup.launching.head_urdf import head_urdf
-from vergence_bringup.node_table import NODES
+from vergence_bringup.node_table import HOSTS, NODES
 from vergence_rig.rig import load_rig
 
 Build = Callable[[Mapping[str, str]], list[Any]]
@@ -123,6 +123,17 @@ def node(executable: str, *files: Path | str, respawn: bool = False, **options: 
         respawn_delay=2.0 if respawn else 0.0,
         on_exit=_report_end(executable, respawn),
         **options,
+    )
+
+
+def host(executable: str, arguments: Sequence[str]) -> Node:
+    """Return a host of several nodes of the table; the launch ends with it."""
+    return Node(
+        package=HOSTS[executable],
+        executable=executable,
+        output="screen",
+        arguments=list(arguments),
+        on_exit=_report_end(executable, respawns=False),
     )
 
 

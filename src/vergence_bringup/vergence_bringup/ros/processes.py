@@ -10,13 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import IO
+from typing import IO, Protocol
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix, get_package_share_directory
 
 from vergence_bringup.graph_errors import ProcessError
 from vergence_bringup.machine import build_hint
-from vergence_bringup.node_table import NODES
+from vergence_bringup.node_table import NODES, package_of
 
 _PR_SET_PDEATHSIG = 1
 
@@ -42,8 +42,16 @@ def find_executable(package: str, executable: str) -> Path:
 
 
 def find_node(executable: str) -> Path:
-    """Return the path of a node of the table; raises ProcessError where it is not built."""
-    return find_executable(NODES[executable].package, executable)
+    """Return the path of a node or host of nodes of the table; raises ProcessError where it is not built."""
+    return find_executable(package_of(executable), executable)
+
+
+class Command(Protocol):
+    """What can be started as a process."""
+
+    def argv(self) -> list[str]:
+        """Return the command line."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -115,7 +123,7 @@ class ProcessGroup:
     ) -> None:
         self.stop()
 
-    def start(self, name: str, command: NodeCommand) -> None:
+    def start(self, name: str, command: Command) -> None:
         """Start one node; its output goes to `<log_dir>/<name>.log`, or to this process's."""
         output: IO[bytes] | None = None
         if self._log_dir is not None:
@@ -130,6 +138,10 @@ class ProcessGroup:
             env=self._environment,
             preexec_fn=_lead_a_group_and_die_with_parent,
         )
+
+    def pid(self, name: str) -> int:
+        """Return the process id of a node that was started."""
+        return self._running[name].pid
 
     def check(self) -> None:
         """Raise ProcessError if a process has ended unexpectedly."""

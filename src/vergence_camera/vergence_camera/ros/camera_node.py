@@ -27,6 +27,7 @@ from vergence_camera.stamps import Stamp, Stamper
 from vergence_camera.v4l2.kernel import Kernel
 from vergence_common.diagnostics import ERROR, OK, STALE, WARN, Diagnostics, Report
 from vergence_common.images import array_to_image
+from vergence_common.local_images import LocalImages
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
@@ -35,9 +36,19 @@ from vergence_rig.rig import load_rig
 
 
 class CameraNode(Node):
-    """Publishes one camera. `kernel` and `tree` replace the machine's own in tests; other options go to Node."""
+    """Publishes one camera, and hands its images to nodes of this process by `images`.
 
-    def __init__(self, *, kernel: Kernel | None = None, tree: SystemTree | None = None, **node_options: Any) -> None:
+    `kernel` and `tree` replace the machine's own in tests; other options go to Node.
+    """
+
+    def __init__(
+        self,
+        *,
+        kernel: Kernel | None = None,
+        tree: SystemTree | None = None,
+        images: LocalImages | None = None,
+        **node_options: Any,
+    ) -> None:
         super().__init__("camera_node", **node_options)
         self._tree = tree or SystemTree()
         self._port = ControlPort(lambda text: self._log(text, True))
@@ -52,6 +63,8 @@ class CameraNode(Node):
 
         diagnostics = Diagnostics(self, hardware_id=settings.device)
         qos = watch_qos(self, diagnostics)
+        self._images, self._topic = images or LocalImages(), self.resolve_topic_name("image_raw")
+        self._images.offer(self._topic)
         self._wanted = (False, False, False)
         topics = ((CompressedImage, "image_raw/compressed"), (CameraInfo, "camera_info"), (Image, "image_raw"))
         self._publishers_of_frames = tuple(
@@ -108,9 +121,14 @@ class CameraNode(Node):
             if info_wanted:
                 header = self._header(stamp)
                 self._info.publish(self._calibration.message(frame.width_px, frame.height_px, header))
-            if raw_wanted:
+            local_wanted = self._images.wanted(self._topic)
+            if raw_wanted or local_wanted:
                 pixels, encoding = decode(frame)
-                self._raw.publish(array_to_image(pixels, self._header(stamp), encoding))
+                header = self._header(stamp)
+                if local_wanted:
+                    self._images.deliver(self._topic, header, pixels)
+                if raw_wanted:
+                    self._raw.publish(array_to_image(pixels, header, encoding))
         except CorruptFrameError as error:
             self._statistics.corrupt(error)
             return

@@ -51,6 +51,7 @@ class GazeControllerNode(Node):
         self._left, self._right = CameraModel(self._rig.left_camera), CameraModel(self._rig.right_camera)
         self._controller = GazeController(self._rig, _parameters(settings), 1.0 / values.control_rate_hz)
         settings.on_change(self._on_parameters)
+        self._described: dict[bool, tuple[object, ...]] = {}
         self._arrived: list[Observation] = []
         self._newest: GazeReport | None = None
         self._cycles = 0
@@ -59,7 +60,8 @@ class GazeControllerNode(Node):
 
         diagnostics = Diagnostics(self)
         diagnostics.add("gaze", self._report)
-        watch = watch_qos(self, diagnostics)
+        self._reads_edges = False
+        self._watch = watch = watch_qos(self, diagnostics)
         self._command = watch.create_publisher(JointState, "joint_command")
         self._track_requests = watch.create_publisher(TrackRequest, "vergence/track_request")
         self._state = watch.create_publisher(GazeState, "gaze/state")
@@ -71,10 +73,7 @@ class GazeControllerNode(Node):
         watch.create_subscription(
             JointState, "servo_node/resolution", lambda m: self._add(convert.joint_resolution(m)), latched
         )
-        watch.create_subscription(EdgeVergence, "vergence/edge", lambda m: self._add(convert.edge_contrast(m)))
-        watch.create_subscription(
-            TargetTrack, "vergence/track", lambda m: self._add(convert.track_sighting(m, self._left))
-        )
+        watch.create_subscription(TargetTrack, "vergence/track", self._on_track)
         watch.create_subscription(
             BoxVergence, "vergence/box", lambda m: self._add(convert.box_sighting(m, self._left.fx_px))
         )
@@ -97,6 +96,18 @@ class GazeControllerNode(Node):
     def _add(self, observation: Observation) -> None:
         self._arrived.append(observation)
 
+    def _on_track(self, message: TargetTrack) -> None:
+        if message.contrast_window_px:
+            self._add(convert.track_contrast(message))
+        elif not self._reads_edges:
+            # Another tracker says nothing of contrast: vergence/edge does, and costs both sides more.
+            self._reads_edges = True
+            self._watch.create_subscription(EdgeVergence, "vergence/edge", self._on_edge)
+        self._add(convert.track_sighting(message, self._left))
+
+    def _on_edge(self, message: EdgeVergence) -> None:
+        self._add(convert.edge_contrast(message))
+
     def _on_target(self, message: PointStamped) -> None:
         stamp_s = to_seconds(message.header.stamp) or self._now_s()
         try:
@@ -107,6 +118,10 @@ class GazeControllerNode(Node):
         self._add(PointSighting(stamp_s, place, math.nan))
 
     def _on_camera(self, message: CameraInfo, left: bool) -> None:
+        described = (message.width, message.height, message.distortion_model, tuple(message.k), tuple(message.d))
+        if self._described.get(left) == described:
+            return  # it comes with every image
+        self._described[left] = described
         try:
             model = convert.camera_model(message)
         except CameraModelError:
@@ -133,8 +148,9 @@ class GazeControllerNode(Node):
             self._command.publish(convert.joint_command(command.joints_rad, now_s))
         if command.track_request is not None:
             self._track_requests.publish(convert.track_request(command.track_request, self._left, self._right))
-        self._state.publish(convert.gaze_state(report, now_s))
-        if math.isfinite(report.fixation_m[0]):
+        if self._state.get_subscription_count():
+            self._state.publish(convert.gaze_state(report, now_s))
+        if math.isfinite(report.fixation_m[0]) and self._fixation.get_subscription_count():
             self._fixation.publish(convert.point_stamped(report.fixation_m, report.stamp_s))
         if self._cycles % _FEEDBACK_EVERY == 0:
             self._look_at.publish_feedback(report)

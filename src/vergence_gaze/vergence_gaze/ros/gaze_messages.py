@@ -112,6 +112,11 @@ def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
     )
 
 
+def track_contrast(message: TargetTrack) -> EdgeContrast:
+    """Return the least contrast of the small windows, which comes with the track."""
+    return EdgeContrast(to_seconds(message.header.stamp), message.contrast, math.nan)
+
+
 def edge_contrast(message: EdgeVergence) -> EdgeContrast:
     """Return the least contrast of the small windows, which show vergence best, and the raw metric of that window."""
     stamp_s, best = to_seconds(message.header.stamp), best_small_window(message.windows_px, message.contrast)

@@ -5,7 +5,6 @@ import math
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
-from rclpy.task import Future
 
 from vergence_common.stamps import to_seconds
 from vergence_gaze.control.controller import GazeController
@@ -25,7 +24,8 @@ class LookAtServer:
     ) -> None:
         self.cameras = cameras
         self._node, self._controller, self._frames = node, controller, frames
-        self._goals: dict[int, tuple[ServerGoalHandle, Future]] = {}
+        self._goals: dict[int, ServerGoalHandle] = {}
+        self._outcomes: dict[bytes, Outcome] = {}
         self._newest: GazeReport | None = None
         self._server = ActionServer(
             node,
@@ -33,12 +33,13 @@ class LookAtServer:
             "gaze/look_at",
             execute_callback=self._execute,
             goal_callback=lambda request: GoalResponse.ACCEPT,
+            handle_accepted_callback=self._on_accepted,
             cancel_callback=lambda handle: CancelResponse.ACCEPT,
         )
 
     def forward_cancels(self, now_s: float) -> None:
         """Cancel the goals whose clients have asked for it."""
-        for goal_id, (handle, _) in list(self._goals.items()):
+        for goal_id, handle in list(self._goals.items()):
             if handle.is_cancel_requested:
                 self._controller.cancel(now_s, goal_id)
 
@@ -46,17 +47,18 @@ class LookAtServer:
         """End the goals that have an outcome in this control cycle."""
         self._newest = command.report
         for outcome in command.outcomes:
-            _, future = self._goals.get(outcome.goal_id, (None, None))
-            if future is not None:
-                future.set_result(outcome)
+            handle = self._goals.pop(outcome.goal_id, None)
+            if handle is not None:
+                self._end(handle, outcome)
 
     def publish_feedback(self, report: GazeReport) -> None:
         """Publish the active goal's feedback."""
-        for goal_id, (handle, _) in self._goals.items():
+        for goal_id, handle in self._goals.items():
             if goal_id == self._controller.goal_id:
                 handle.publish_feedback(convert.look_at_feedback(report))
 
-    async def _execute(self, handle: ServerGoalHandle) -> LookAt.Result:
+    def _on_accepted(self, handle: ServerGoalHandle) -> None:
+        # The goal is executed once it has ended: rclpy's events executor calls a coroutine that awaits without pause.
         now_s, request = self._now_s(), handle.request
         try:
             stamp_s = to_seconds(request.header.stamp) or math.nan
@@ -65,15 +67,20 @@ class LookAtServer:
             place = self._frames.in_rig(request.point, frame, stamp_s) if is_point else (math.nan,) * 3
             goal = convert.goal(request, place, *self.cameras)
         except ValueError as error:
+            self._end(handle, Outcome(0, Result.INVALID, str(error), 0.0))
+            return
+        self._goals[self._controller.look_at(goal, now_s)] = handle
+
+    def _end(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
+        self._outcomes[bytes(handle.goal_id.uuid)] = outcome
+        handle.execute()
+
+    def _execute(self, handle: ServerGoalHandle) -> LookAt.Result:
+        """Return the result of a goal that has ended."""
+        outcome = self._outcomes.pop(bytes(handle.goal_id.uuid))
+        if outcome.result is Result.INVALID:
             handle.abort()
-            return convert.look_at_result(Outcome(0, Result.INVALID, str(error), 0.0), None, now_s)
-        goal_id = self._controller.look_at(goal, now_s)
-        future = Future()
-        self._goals[goal_id] = (handle, future)
-        try:
-            outcome: Outcome = await future
-        finally:
-            del self._goals[goal_id]
+            return convert.look_at_result(outcome, None, self._now_s())
         if outcome.result is Result.VERGED:
             handle.succeed()
         elif outcome.result is Result.CANCELLED and handle.is_cancel_requested:
@@ -81,7 +88,7 @@ class LookAtServer:
         else:
             handle.abort()
         self._node.get_logger().info(
-            f"gaze/look_at: goal {goal_id} ended as {outcome.result.name} after {outcome.time_s:.2f} s: "
+            f"gaze/look_at: goal {outcome.goal_id} ended as {outcome.result.name} after {outcome.time_s:.2f} s: "
             f"{outcome.reason}"
         )
         return convert.look_at_result(outcome, self._newest, self._now_s())

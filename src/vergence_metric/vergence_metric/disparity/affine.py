@@ -39,6 +39,8 @@ _PRIOR_SHEAR = 0.1  # standard deviation of slant and roll between the eyes
 _PRIOR_VERTICAL_PX = 1.0
 
 Matrix = NDArray[np.float64]
+Warp = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Two rows: the linear part's two columns, and the translation [px]."""
 
 
 @dataclass(frozen=True)
@@ -129,26 +131,33 @@ def fit_affine(
     window = _linearised(left, point_px, sigma, support)
     if window is None:
         return None
-    found = np.vstack([warp, [0.0, 0.0, 1.0]])
+    (a, b, x), (c, d, y) = warp.tolist()
     gain = 1.0
     for _ in range(_ITERATIONS):
-        seen = window.seen(right, point_px, found, gain)
+        seen = window.seen(right, point_px, ((a, b, x), (c, d, y)), gain)
         solution = window.inverse @ np.einsum("in,n->i", window.weighted, window.roots * seen)
         gain = float(solution[6])
         if not _LEAST_GAIN <= gain <= 1.0 / _LEAST_GAIN:
             return None
-        step = solution[:6] / gain
-        found = found @ _undone(step, sigma)
-        if np.abs(found[:2, :2] - np.eye(2)).max() > _LARGEST_SHEAR or np.abs(step[[0, 3]]).max() > _LARGEST_LEAP_PX:
+        step = [value / gain for value in solution[:6].tolist()]
+        (e, f, g), (h, i, j) = _undone(step, sigma)
+        a, b, x, c, d, y = (
+            a * e + b * h,
+            a * f + b * i,
+            a * g + b * j + x,
+            c * e + d * h,
+            c * f + d * i,
+            c * g + d * j + y,
+        )
+        sheared = max(abs(a - 1.0), abs(b), abs(c), abs(d - 1.0)) > _LARGEST_SHEAR
+        if sheared or max(abs(step[0]), abs(step[3])) > _LARGEST_LEAP_PX:
             return None
-        if np.abs(step).max() < _CONVERGED_PX:
+        if max(map(abs, step)) < _CONVERGED_PX:
             break
     residual = seen - np.einsum("i,in->n", solution, window.design)
     variance = float(np.square(window.roots * residual).sum())
     sigma_px = math.hypot(window.deviation(residual) / gain, _FLOOR_PX)
-    return Fit(
-        -float(found[0, 2]), -float(found[1, 2]), sigma_px, math.sqrt(variance), found[:2, :2].copy(), window.texture
-    )
+    return Fit(-x, -y, sigma_px, math.sqrt(variance), np.array([[a, b], [c, d]]), window.texture)
 
 
 @dataclass(frozen=True)
@@ -169,16 +178,21 @@ class _Window:
     inverse: Matrix
     texture: float
 
-    def seen(self, right: Strip, point_px: tuple[float, float], warp: Matrix, gain: float) -> Matrix:
+    def seen(self, right: Strip, point_px: tuple[float, float], warp: Warp, gain: float) -> Matrix:
         """Return what the right image shows at the warped offsets (N)."""
-        (u, v), (gx, gy) = self.offsets, self.gradients
-        x = warp[0, 0] * u + warp[0, 1] * v + (warp[0, 2] + point_px[0] - right.x0)
-        y = warp[1, 0] * u + warp[1, 1] * v + (warp[1, 2] + point_px[1] - right.y0)
-        # remap of OpenCV 4 rounds to this grid, that of OpenCV 5 does not: round first, make good what that misses.
-        near_x, near_y = np.rint(x * _REMAP_STEPS) / _REMAP_STEPS, np.rint(y * _REMAP_STEPS) / _REMAP_STEPS
-        maps = near_x.astype(np.float32), near_y.astype(np.float32)
-        sampled = cv2.remap(right.grey, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return np.asarray((sampled + gain * ((x - near_x) * gx + (y - near_y) * gy)).ravel())
+        # remap of OpenCV 4 rounds to a grid, that of OpenCV 5 does not: round first, make good what that misses.
+        maps, missed = [], np.zeros(())
+        for (across, down, shift), at, first, gradient in zip(
+            warp, point_px, (right.x0, right.y0), self.gradients, strict=True
+        ):
+            steps = (_REMAP_STEPS * across) * self.offsets[0] + (
+                (_REMAP_STEPS * down) * self.offsets[1] + _REMAP_STEPS * (shift + at - first)
+            )
+            near = np.rint(steps)
+            maps.append(np.multiply(near, 1.0 / _REMAP_STEPS, dtype=np.float32, casting="same_kind"))
+            missed = missed + (steps - near) * gradient
+        sampled = cv2.remap(right.grey, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray((sampled + (gain / _REMAP_STEPS) * missed).ravel())
 
     def deviation(self, residual: Matrix) -> float:
         """Return the standard deviation of the horizontal translation [px, times gain] by the residuals (N).
@@ -251,9 +265,9 @@ def _damping(sigma: float, share: float) -> Matrix:
     return damping
 
 
-def _undone(step: Matrix, sigma: float) -> Matrix:
-    """Return the inverse warp (3, 3) of an increment (6): translation across, two shears, the same three down."""
+def _undone(step: list[float], sigma: float) -> Warp:
+    """Return the inverse warp of an increment (6): translation across, two shears, the same three down."""
     a, b, c, d = 1 + step[1] / sigma, step[2] / sigma, step[4] / sigma, 1 + step[5] / sigma
     scale = 1.0 / (a * d - b * c)
     a, b, c, d = scale * d, -scale * b, -scale * c, scale * a
-    return np.array([[a, b, -a * step[0] - b * step[3]], [c, d, -c * step[0] - d * step[3]], [0.0, 0.0, 1.0]])
+    return (a, b, -a * step[0] - b * step[3]), (c, d, -c * step[0] - d * step[3])

@@ -48,9 +48,15 @@ class Profile:
 
     def at(self, d: float) -> float:
         """Return the best correlation within a column of a disparity, -1 outside the range."""
-        i = round((d - self.first_px) / self.scale)
-        near = self.values[max(i - 1, 0) : max(i + 2, 0)]
-        return float(near.max()) if near.size else -1.0
+        i = round((d - self.first_px) / self.scale) + 1
+        return self._best_near[i] if 0 <= i < len(self._best_near) else -1.0
+
+    @cached_property
+    def _best_near(self) -> list[float]:
+        """The best value within a column of each column, from one before the first to one after the last."""
+        padded = np.pad(self.values, 2, constant_values=-1.0)
+        best: list[float] = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:]).tolist()
+        return best
 
     @cached_property
     def peaks(self) -> NDArray[np.intp]:

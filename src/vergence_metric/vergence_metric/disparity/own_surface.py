@@ -69,7 +69,8 @@ def _plane(
     d: float,
     tolerance: NDArray[np.floating],
 ) -> tuple[float, float, float]:
-    box = np.ix_(np.flatnonzero(np.abs(v[:, 0]) <= _NEAR_PX), np.flatnonzero(np.abs(u[0]) <= _NEAR_PX))
+    rows, columns = np.flatnonzero(np.abs(v[:, 0]) <= _NEAR_PX), np.flatnonzero(np.abs(u[0]) <= _NEAR_PX)
+    box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
     near = values[box]
     mine = np.abs(near - d) <= tolerance[box]
     if np.count_nonzero(mine) < _FEWEST:

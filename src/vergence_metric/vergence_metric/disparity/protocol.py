@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -36,6 +36,26 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class Surface:
+    """The surface that a point lies on: how its disparities change about the point, and which pixels belong to it.
+
+    `slopes` (2, 2) are the changes of the horizontal and of the vertical disparity (rows) per pixel across and down.
+    `support` (h, w) is 1 at pixels on the surface, else 0; its top left pixel is `origin_px` (x, y) of the left image.
+    """
+
+    slopes: NDArray[np.float64]
+    support: NDArray[np.float32]
+    origin_px: tuple[int, int]
+
+    def share(self, point_px: Point, half_px: int) -> float:
+        """Return the share of the pixels in the square about a point that lie on the surface; 0 outside the support."""
+        i, j = round(point_px[0]) - self.origin_px[0] - half_px, round(point_px[1]) - self.origin_px[1] - half_px
+        side = 2 * half_px + 1
+        about = self.support[max(j, 0) : max(j + side, 0), max(i, 0) : max(i + side, 0)]
+        return float(about.sum()) / side**2
+
+
+@dataclass(frozen=True)
 class Disparity:
     """The disparity of one point of the left image.
 
@@ -45,7 +65,8 @@ class Disparity:
     `semi_global` as fitted to real pairs. `confidence` is the share of estimates with the same evidence that lie within
     2 px of the truth (see `evidence.py`, `semi_global_model.py`). Where `status` is not OK the figures are NaN, except
     that an estimate that was measured and rejected keeps its best guess; its confidence is at most 0.5. `candidates`
-    are the disparities that the point may have, likeliest first, where the estimator ranks them.
+    are the disparities that the point may have, likeliest first, where the estimator ranks them. `surface` is what the
+    point lies on, where the estimator measures it.
     """
 
     horizontal_px: float
@@ -57,6 +78,7 @@ class Disparity:
     estimator: str
     point_px: Point
     candidates: tuple[Candidate, ...] = ()
+    surface: Surface | None = field(default=None, repr=False, compare=False)
 
     @property
     def ok(self) -> bool:

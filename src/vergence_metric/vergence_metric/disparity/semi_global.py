@@ -18,7 +18,15 @@ from vergence_metric.disparity.fovea_pair import FoveaPair
 from vergence_metric.disparity.lighting import lit_alike
 from vergence_metric.disparity.own_surface import OwnSurface, own_surface
 from vergence_metric.disparity.parameters import DisparityParameters
-from vergence_metric.disparity.protocol import Candidate, Disparity, DisparityEstimator, DisparityStatus, Image, Point
+from vergence_metric.disparity.protocol import (
+    Candidate,
+    Disparity,
+    DisparityEstimator,
+    DisparityStatus,
+    Image,
+    Point,
+    Surface,
+)
 from vergence_metric.disparity.search import pair_about
 from vergence_metric.disparity.semi_global_model import Evidence, Support, choice_score, confidence, sigma_px
 from vergence_metric.disparity.strip_matching import LARGEST_HALF_PX, coarse, fine, returned
@@ -104,14 +112,15 @@ class PointMatching:
         if not self.choices:
             return Disparity.none(DisparityStatus.NO_MATCH, "nothing in the right image fits", name, point)
         best = self.likeliest()
-        evidence, horizontal, vertical = self.measure(best)
+        evidence, horizontal, vertical, surface = self.measure(best)
         repeated = self.repeated(best)
         sure = confidence(evidence)
         status, reason = self._status(best, evidence, sure, repeated)
         if status is not DisparityStatus.OK or not self.beyond_chance(best, evidence, _SURE_DEVIATIONS):
             sure = min(sure, _UNSURE)
         ranked = self._ranked(best, repeated)
-        return Disparity(horizontal, vertical, sigma_px(evidence), sure, status, reason, name, point, ranked)
+        sigma = sigma_px(evidence)
+        return Disparity(horizontal, vertical, sigma, sure, status, reason, name, point, ranked, surface)
 
     def likeliest(self) -> Choice:
         """Return what the strip gives the point, if it is likelier than none, else the candidate of the highest score.
@@ -126,8 +135,8 @@ class PointMatching:
         own = [one for one in near if one.support.agrees and one.score > 0.0]
         return max(own or near, key=lambda one: one.score)
 
-    def measure(self, choice: Choice) -> tuple[Evidence, float, float]:
-        """Return what speaks for a candidate, and its disparities across and down by the fit on its own surface."""
+    def measure(self, choice: Choice) -> tuple[Evidence, float, float, Surface]:
+        """Return what speaks for a candidate, its disparities across and down by the fit on its surface, and that."""
         windows = self._parameters.windows_px
         own = own_surface(self._fine, self._at, choice.disparity_px, radius_of(windows[-1]) + 1)
         start = (own.disparity_px, float(self._vertical), windows[0])
@@ -140,7 +149,9 @@ class PointMatching:
             fit_correlation=fit.correlation if fit else 0.0,
             off_plane_px=abs(fit.horizontal_px - own.disparity_px) if fit else math.nan,
         )
-        return evidence, *self._kept(own, fit)
+        slopes = np.array([[own.slope_x, own.slope_y], [0.0, 0.0]]) if fit is None else np.eye(2) - fit.affine
+        surface = Surface(slopes, own.support.grey, (round(own.support.x0), round(own.support.y0)))
+        return evidence, *self._kept(own, fit), surface
 
     def repeated(self, choice: Choice) -> list[float]:
         """Return the disparities that a repeated texture makes as good as this candidate's."""

@@ -10,13 +10,17 @@ texture and exposure cancel. It detects vergence but gives no direction: it is f
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.edges.oriented_edges import OrientedField
+from vergence_metric.edges.windows import Window
+from vergence_rig.verged import SMALL_WINDOWS_PX, best_small_window
 
+_FOVEAL_SIGMAS = 4.0  # a window this many times as wide as the foveal weight's deviation holds it
 _LATTICE = 24  # points along a window's side that represent all its pixels
 
 
@@ -31,6 +35,31 @@ class Contrasts:
     def both(self) -> NDArray[np.float64]:
         """Mean of the two directions."""
         return (self.left_to_right + self.right_to_left) / 2.0
+
+
+@dataclass(frozen=True)
+class WindowContrast:
+    """The contrast of one window, NaN where it could not be measured, and the window's requested side [px]."""
+
+    contrast: float
+    window_px: int
+
+
+def small_windows(windows: Sequence[Window], foveal_sigma_px: float) -> tuple[Window, ...]:
+    """Return the windows that `least_contrast` and `foveal_contrast` need; the smallest one where none is small."""
+    ordered = sorted(windows, key=lambda window: window.size_px)
+    foveal = next((w for w in ordered if w.size_px >= _FOVEAL_SIGMAS * foveal_sigma_px), ordered[-1])
+    largest_px = max(foveal.size_px, SMALL_WINDOWS_PX[1])
+    return tuple(w for w in ordered if w.size_px <= largest_px)
+
+
+def least_contrast(field: OrientedField, truncation_px: int) -> WindowContrast:
+    """Return the least contrast of the windows of SMALL_WINDOWS_PX; NaN where none is measurable."""
+    found, sizes_px = contrasts(field, truncation_px).both.tolist(), [window.size_px for window in field.windows]
+    best = best_small_window(sizes_px, found)
+    return (
+        WindowContrast(math.nan, SMALL_WINDOWS_PX[0]) if best is None else WindowContrast(found[best], sizes_px[best])
+    )
 
 
 def contrasts(field: OrientedField, truncation_px: int) -> Contrasts:
@@ -59,7 +88,7 @@ def foveal_contrast(field: OrientedField, truncation_px: int, sigma_px: float) -
     a Gaussian; chance is that of the smallest window which holds two standard deviations of it. Mean of both
     directions, NaN where an image has no edge pixels.
     """
-    wide_enough = [i for i, window in enumerate(field.windows) if window.size_px >= 4.0 * sigma_px]
+    wide_enough = [i for i, window in enumerate(field.windows) if window.size_px >= _FOVEAL_SIGMAS * sigma_px]
     window = wide_enough[0] if wide_enough else len(field.windows) - 1
     ratios = []
     for direction in (0, 1):

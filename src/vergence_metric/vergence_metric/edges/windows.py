@@ -1,7 +1,7 @@
 """Centre windows: the squares around the principal point in which the paper measures vergence."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,16 @@ class Window:
     def lattice(self, points_per_side: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return rows and columns, from the window's corner, of at most that many pixels a side, evenly spread."""
         return _evenly(self.height, points_per_side), _evenly(self.width, points_per_side)
+
+    def shifted(self, down: int, right: int) -> "Window":
+        """Return the window as it lies in an image whose top left pixel is moved."""
+        return replace(
+            self,
+            top=self.top - down,
+            left=self.left - right,
+            bottom=self.bottom - down,
+            right=self.right - right,
+        )
 
     @property
     def slices(self) -> tuple[slice, slice]:

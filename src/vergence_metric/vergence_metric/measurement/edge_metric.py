@@ -1,9 +1,10 @@
 """The edge metric of a stereo pair in one call, for the node and `vergence measure`."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,18 +12,27 @@ from numpy.typing import NDArray
 
 from vergence_metric.alignment.alignment import Aligner, Alignment
 from vergence_metric.alignment.parameters import AlignmentParameters
-from vergence_metric.edges.chance import chance_levels
-from vergence_metric.edges.contrast import contrasts, foveal_contrast
-from vergence_metric.edges.edge_distance import edge_distances
-from vergence_metric.edges.edges import Edges, Grey, ImageShapeError, detect_edges, to_grey
+from vergence_metric.edges.chance import ChanceLevels, chance_levels
+from vergence_metric.edges.contrast import (
+    Contrasts,
+    WindowContrast,
+    contrasts,
+    foveal_contrast,
+    least_contrast,
+    small_windows,
+)
+from vergence_metric.edges.edge_distance import EdgeDistances, edge_distances
+from vergence_metric.edges.edges import Edges, Grey, ImageShapeError, detect_edges, detect_edges_within, to_grey
 from vergence_metric.edges.nearest_edges import NearestEdges
-from vergence_metric.edges.oriented_edges import oriented_field
+from vergence_metric.edges.oriented_edges import OrientedField, oriented_field
 from vergence_metric.edges.parameters import ContrastParameters, EdgeParameters
 from vergence_metric.edges.robust import robust_distances
 from vergence_metric.edges.scratch import Scratch
-from vergence_metric.edges.windows import Window, centre_windows
+from vergence_metric.edges.windows import Window, centre_windows, hull
 
 Values = NDArray[np.float64]
+
+_EDGE_REACH_PX = 75  # around the small windows: weak edges are followed so far to strong ones
 
 
 @dataclass(frozen=True)
@@ -40,35 +50,133 @@ class EdgeMetricResult:
     """Everything measured on one pair; element i of each array belongs to `windows[i]`.
 
     `left_grey` and `right_grey` (h, w) uint8 are the images compared, the right one aligned. Arrays carry
-    the names of vergence_msgs/EdgeVergence; values are float64, NaN where `status` (WindowStatus) gives a reason.
-    `foveal_contrast` is weighted by a Gaussian about the centre. `stage_s` is the duration of each stage [s].
+    the names of vergence_msgs/EdgeVergence; values are float64, NaN where `status` (WindowStatus) gives a reason. Only
+    `foveal_contrast`, which is weighted by a Gaussian about the centre, and `least_contrast` of the small windows are
+    measured at once; the arrays are measured when they are read. `stage_s` is the duration of each stage so far [s].
     """
 
     windows: tuple[Window, ...]
     alignment: Alignment
     left_grey: Grey
     right_grey: Grey
-    left_edges: Edges
-    right_edges: Edges
-    left_to_right_px: Values
-    right_to_left_px: Values
-    left_edge_count: NDArray[np.int64]
-    right_edge_count: NDArray[np.int64]
-    chance_left_to_right_px: Values
-    chance_right_to_left_px: Values
-    contrast_left_to_right: Values
-    contrast_right_to_left: Values
-    contrast: Values
     foveal_contrast: float
-    robust_left_to_right_px: Values
-    robust_right_to_left_px: Values
-    status: NDArray[np.uint8]
-    stage_s: dict[str, float] = field(default_factory=dict)
+    least_contrast: WindowContrast
+    edge_parameters: EdgeParameters
+    contrast_parameters: ContrastParameters
+    stage_s: dict[str, float]
+
+    @cached_property
+    def left_edges(self) -> Edges:
+        """Edges of the whole left image."""
+        with _timed(self.stage_s, "left_edges"):
+            return detect_edges(self.left_grey, self.edge_parameters)
+
+    @cached_property
+    def right_edges(self) -> Edges:
+        """Edges of the whole right image."""
+        with _timed(self.stage_s, "right_edges"):
+            return detect_edges(self.right_grey, self.edge_parameters)
 
     @property
     def windows_px(self) -> NDArray[np.uint32]:
         """Requested sides of the windows [px]."""
         return np.array([window.size_px for window in self.windows], np.uint32)
+
+    @property
+    def left_to_right_px(self) -> Values:
+        """Mean distance from the left edge pixels to the nearest right ones."""
+        return self._distances.left_to_right_px
+
+    @property
+    def right_to_left_px(self) -> Values:
+        """Mean distance from the right edge pixels to the nearest left ones."""
+        return self._distances.right_to_left_px
+
+    @property
+    def left_edge_count(self) -> NDArray[np.int64]:
+        """Edge pixels of the left image."""
+        return self._distances.left_count
+
+    @property
+    def right_edge_count(self) -> NDArray[np.int64]:
+        """Edge pixels of the right image."""
+        return self._distances.right_count
+
+    @property
+    def status(self) -> NDArray[np.uint8]:
+        """WindowStatus of each window."""
+        return self._distances.status
+
+    @property
+    def chance_left_to_right_px(self) -> Values:
+        """What `left_to_right_px` would be if the images were unrelated."""
+        return self._chance.left_to_right_px
+
+    @property
+    def chance_right_to_left_px(self) -> Values:
+        """What `right_to_left_px` would be if the images were unrelated."""
+        return self._chance.right_to_left_px
+
+    @property
+    def contrast_left_to_right(self) -> Values:
+        """Contrast with chance, from the left edge pixels to the right ones."""
+        return self._contrasts.left_to_right[self._rank]
+
+    @property
+    def contrast_right_to_left(self) -> Values:
+        """Contrast with chance, from the right edge pixels to the left ones."""
+        return self._contrasts.right_to_left[self._rank]
+
+    @property
+    def contrast(self) -> Values:
+        """Mean of both directions' contrasts."""
+        return self._contrasts.both[self._rank]
+
+    @property
+    def robust_left_to_right_px(self) -> Values:
+        """Robust form of `left_to_right_px`."""
+        return self._robust[0][self._rank]
+
+    @property
+    def robust_right_to_left_px(self) -> Values:
+        """Robust form of `right_to_left_px`."""
+        return self._robust[1][self._rank]
+
+    @property
+    def _rank(self) -> NDArray[np.intp]:
+        """The place of each window among the windows sorted by size, as oriented values are."""
+        return np.argsort(np.argsort([window.size_px for window in self.windows]))
+
+    @cached_property
+    def _nearest(self) -> NearestEdges:
+        return NearestEdges(self.left_edges.mask, self.right_edges.mask, self.windows)
+
+    @cached_property
+    def _distances(self) -> EdgeDistances:
+        with _timed(self.stage_s, "distance"):
+            return edge_distances(self._nearest)
+
+    @cached_property
+    def _chance(self) -> ChanceLevels:
+        with _timed(self.stage_s, "chance"):
+            return chance_levels(self._nearest)
+
+    @cached_property
+    def _oriented(self) -> OrientedField:
+        p = self.contrast_parameters
+        truncation_px = max(p.truncation_px, p.robust_truncation_px)
+        return _oriented_field(self.left_edges, self.right_edges, self.windows, p, truncation_px)
+
+    @cached_property
+    def _contrasts(self) -> Contrasts:
+        with _timed(self.stage_s, "contrasts"):
+            return contrasts(self._oriented, self.contrast_parameters.truncation_px)
+
+    @cached_property
+    def _robust(self) -> tuple[Values, Values]:
+        p = self.contrast_parameters
+        with _timed(self.stage_s, "robust"):
+            return robust_distances(self._oriented, p.robust_truncation_px, p.robust_sigma_px)
 
 
 class EdgeMetric:
@@ -84,7 +192,7 @@ class EdgeMetric:
         self._edges = edges or EdgeParameters()
         self._contrast = contrast or ContrastParameters()
         self._aligner = Aligner(alignment or AlignmentParameters())
-        self._scratch = Scratch()
+        self._scratch = (Scratch(), Scratch())  # one for each eye
 
     def measure(self, left: NDArray[Any], right: NDArray[Any]) -> EdgeMetricResult:
         """Measure a pair of (h, w, 3) BGR or (h, w) grey uint8 images of one size.
@@ -114,51 +222,40 @@ class EdgeMetric:
     def measure_aligned(self, pair: AlignedPair) -> EdgeMetricResult:
         """Measure a pair that `align` has returned."""
         p, stage_s = self._contrast, dict(pair.stage_s)
-        left_grey, right_grey = pair.left_grey, pair.right_grey
-        with _timed(stage_s, "edges"):
-            left_edges, right_edges = detect_edges(left_grey, self._edges), detect_edges(right_grey, self._edges)
-        windows = centre_windows(self._edges.windows_px, *left_grey.shape)
-        with _timed(stage_s, "distance"):
-            nearest = NearestEdges(left_edges.mask, right_edges.mask, windows, self._scratch)
-            distances = edge_distances(nearest)
-        with _timed(stage_s, "chance"):
-            chance = chance_levels(nearest)
-        with _timed(stage_s, "contrast"):
-            oriented = oriented_field(
-                left_edges,
-                right_edges,
-                windows,
-                bins=p.orientation_bins,
-                signed=p.orientation_signed,
-                truncation_px=max(p.truncation_px, p.robust_truncation_px),
-                scratch=self._scratch,
-            )
-            contrast = contrasts(oriented, p.truncation_px)
-            foveal = foveal_contrast(oriented, p.truncation_px, p.foveal_sigma_px)
-            robust_left, robust_right = robust_distances(oriented, p.robust_truncation_px, p.robust_sigma_px)
-        rank = np.argsort(np.argsort([window.size_px for window in windows]))  # oriented values are sorted by size
-        return EdgeMetricResult(
-            windows,
-            pair.alignment,
-            left_grey,
-            right_grey,
-            left_edges,
-            right_edges,
-            distances.left_to_right_px,
-            distances.right_to_left_px,
-            distances.left_count,
-            distances.right_count,
-            chance.left_to_right_px,
-            chance.right_to_left_px,
-            contrast.left_to_right[rank],
-            contrast.right_to_left[rank],
-            contrast.both[rank],
-            foveal,
-            robust_left[rank],
-            robust_right[rank],
-            distances.status,
-            stage_s,
+        height, width = pair.left_grey.shape
+        windows = centre_windows(self._edges.windows_px, height, width)
+        small = small_windows(windows, p.foveal_sigma_px)
+        outer = hull(small)
+        area = (
+            slice(max(outer.top - _EDGE_REACH_PX, 0), min(outer.bottom + _EDGE_REACH_PX, height)),
+            slice(max(outer.left - _EDGE_REACH_PX, 0), min(outer.right + _EDGE_REACH_PX, width)),
         )
+        with _timed(stage_s, "edges"):
+            scratch = self._scratch
+            left, right = (
+                detect_edges_within(grey, self._edges, area, scratch[eye])
+                for eye, grey in enumerate((pair.left_grey, pair.right_grey))
+            )
+        with _timed(stage_s, "contrast"):
+            there = [window.shifted(area[0].start, area[1].start) for window in small]
+            oriented = _oriented_field(left, right, there, p, p.truncation_px, scratch[0])
+            foveal = foveal_contrast(oriented, p.truncation_px, p.foveal_sigma_px)
+            least = least_contrast(oriented, p.truncation_px)
+        return EdgeMetricResult(
+            windows, pair.alignment, pair.left_grey, pair.right_grey, foveal, least, self._edges, p, stage_s
+        )
+
+
+def _oriented_field(
+    left: Edges,
+    right: Edges,
+    windows: Sequence[Window],
+    parameters: ContrastParameters,
+    truncation_px: int,
+    scratch: Scratch | None = None,
+) -> OrientedField:
+    bins, signed = parameters.orientation_bins, parameters.orientation_signed
+    return oriented_field(left, right, windows, bins=bins, signed=signed, truncation_px=truncation_px, scratch=scratch)
 
 
 @contextmanager

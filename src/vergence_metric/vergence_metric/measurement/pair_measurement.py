@@ -9,6 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from vergence_metric.disparity import Disparity, make_estimator
+from vergence_metric.disparity.shared_estimate import SharedEstimate
 from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
@@ -21,7 +22,6 @@ from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import Rig
-from vergence_rig.verged import best_small_window
 
 _SAME_IMAGE_S = 0.1  # a request is for the pair nearest to its stamp, at most this far from it
 
@@ -45,7 +45,7 @@ class PairMeasurement:
         self._parameters = p = parameters
         self._metric = EdgeMetric(p.edges, p.contrast, p.alignment)
         self._classifier = FovealVergenceClassifier(p.verged)
-        self._estimator = make_estimator(p.disparity)
+        self._estimator = SharedEstimate(make_estimator(p.disparity), p.disparity)
 
     @property
     def parameters(self) -> PairMeasurementParameters:
@@ -61,7 +61,7 @@ class PairMeasurement:
         if p.verged != before.verged:
             self._classifier = FovealVergenceClassifier(p.verged)
         if p.disparity != before.disparity:
-            self._estimator = make_estimator(p.disparity)
+            self._estimator = SharedEstimate(make_estimator(p.disparity), p.disparity)
             self._tracker = None
         if p.tracker != before.tracker:
             self._tracker = None
@@ -81,10 +81,8 @@ class PairMeasurement:
 
     def verged(self, edge: EdgeMetricResult, error_px: float, confidence: float) -> bool:
         """Return whether the eyes are verged, by contrast, signed error, and the result of the last pair."""
-        best = best_small_window(edge.windows_px, edge.contrast)
-        contrast = math.nan if best is None else float(edge.contrast[best])
         left, _ = self._models or self._rig_models
-        return self._classifier.update(contrast, math.atan(error_px / left.fx_px), confidence)
+        return self._classifier.update(edge.least_contrast.contrast, math.atan(error_px / left.fx_px), confidence)
 
     def request_track(self, request: TrackRequest) -> None:
         """Let the tracker follow a point, from the next pair on; may be called from another thread."""

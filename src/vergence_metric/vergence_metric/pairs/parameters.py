@@ -27,8 +27,8 @@ class StereoParameters(Parameters):
     )
     threads: int = parameter(
         1,
-        "number of threads that OpenCV may use for one operation; 0 leaves it to OpenCV. More threads take cores "
-        "from other nodes",
+        "number of threads that OpenCV and BLAS may use for one operation; 0 is one for each core. More threads take "
+        "cores from other nodes",
         minimum=0,
         maximum=64,
     )

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import cv2
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
@@ -34,22 +33,22 @@ from vergence_metric.ros.box_messages import (
     vision_message,
     vision_type,
 )
+from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.stereo_node import StereoNode
 from vergence_msgs.msg import BoxVergence, StereoDetections
 from vergence_rig.rig import load_rig
 
 EYES = ("left", "right")
 
 
-class BoxMetricNode(StereoNode):
+class BoxMetricNode(MetricNode):
     """Measures the newest pair, at most `rate_hz` times a second, on a thread of its own."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("box_metric_node", **options)
         self._settings = declare(self, GROUPS)
         settings: BoxMetricNodeParameters = self._settings.value
-        cv2.setNumThreads(settings.threads or -1)
+        limit_threads(settings.threads)
         rig = load_rig(settings.rig)
         self._metric_parameters = _parameters_of(self._settings)
         self._measurement = BoxMeasurement(self._metric_parameters, rig.baseline_m, threads=settings.threads)
@@ -58,23 +57,24 @@ class BoxMetricNode(StereoNode):
         self._due_ns = 0
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
-        self._box_publisher = qos.create_publisher(BoxVergence, "vergence/box")
-        self._point_publisher = qos.create_publisher(PoseWithCovarianceStamped, "vergence/target_point")
-        self._detections_publisher = qos.create_publisher(StereoDetections, "vergence/detections")
-        self._overlay_publisher = qos.create_publisher(Image, "vergence/box_overlay", IMAGE_QOS)
+        self._box_publisher = self._output(qos, BoxVergence, "vergence/box")
+        self._point_publisher = self._output(qos, PoseWithCovarianceStamped, "vergence/target_point")
+        self._detections_publisher = self._output(qos, StereoDetections, "vergence/detections")
+        self._overlay_publisher = self._output(qos, Image, "vergence/box_overlay", IMAGE_QOS)
         vision = vision_type()
         self._vision_publishers = [
-            qos.create_publisher(vision, f"vergence/{eye}_detections") for eye in EYES if vision is not None
+            self._output(qos, vision, f"vergence/{eye}_detections") for eye in EYES if vision is not None
         ]
         self._worker: LatestWorker[ImagePair] = LatestWorker(
             self._measure, self._on_failure, "measure", settings.niceness
         )
         pairing = self._settings.get(PairingParameters)
-        self._stereo = StereoInput(self, settings, pairing, diagnostics, qos, self._on_pair)
+        self._stereo = StereoInput(self, settings, pairing, diagnostics, qos, self._on_pair, images=self._images)
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self.add_on_set_parameters_callback(self._refuse_unknown_classes)
         self._settings.on_change(self._on_settings)
         diagnostics.add("detector", self._report)
+        diagnostics.add("outputs", self._report_outputs)
 
     def _refuse_unknown_classes(self, changes: list[Parameter]) -> SetParametersResult:
         wanted = next((tuple(c.value or ()) for c in changes if c.name == "detector.classes"), ())
@@ -85,7 +85,7 @@ class BoxMetricNode(StereoNode):
         return SetParametersResult(successful=True)
 
     def _on_settings(self, settings: ParameterSet) -> None:
-        cv2.setNumThreads(settings.value.threads or -1)
+        limit_threads(settings.value.threads)
         self._metric_parameters = _parameters_of(settings)
         self._stereo.set_parameters(settings.value, settings.get(PairingParameters))
 

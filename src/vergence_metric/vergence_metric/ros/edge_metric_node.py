@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from time import monotonic_ns
 from typing import Any
 
-import cv2
 from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import Header
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.images import array_to_image
@@ -23,8 +23,8 @@ from vergence_metric.measurement.parameters import GROUPS, PairMeasurementParame
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.ros.edge_messages import edge_message, error_message
+from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.stereo_node import StereoNode
 from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
@@ -33,32 +33,33 @@ from vergence_rig.rig import load_rig
 _JOINT_SAMPLES_NS = 500_000_000  # longer than two pairs can be apart while the tracker still follows
 
 
-class EdgeMetricNode(StereoNode):
+class EdgeMetricNode(MetricNode):
     """Measures the newest pair on its own thread; the executor's thread only receives images and pairs them."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("edge_metric_node", **options)
         self._settings = declare(self, GROUPS)
         stereo = self._settings.get(StereoParameters)
-        cv2.setNumThreads(stereo.threads or -1)
+        limit_threads(stereo.threads)
         self._measurement = PairMeasurement(_measurement_parameters(self._settings), load_rig(stereo.rig))
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
-        self._edge_publisher = qos.create_publisher(EdgeVergence, "vergence/edge")
-        self._error_publisher = qos.create_publisher(VergenceError, "vergence/error")
-        self._track_publisher = qos.create_publisher(TargetTrack, "vergence/track")
-        self._overlay_publisher = qos.create_publisher(Image, "vergence/overlay", IMAGE_QOS)
+        self._edge_publisher = self._output(qos, EdgeVergence, "vergence/edge")
+        self._error_publisher = self._output(qos, VergenceError, "vergence/error")
+        self._track_publisher = self._output(qos, TargetTrack, "vergence/track")
+        self._overlay_publisher = self._output(qos, Image, "vergence/overlay", IMAGE_QOS)
         self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
         pairing = self._settings.get(PairingParameters)
-        self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit)
+        self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit, images=self._images)
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self._request_subscription = qos.create_subscription(TrackRequest, "vergence/track_request", self._on_request)
         self._settings.on_change(self._on_settings)
         diagnostics.add("measurement", self._report)
+        diagnostics.add("outputs", self._report_outputs)
 
     def _on_settings(self, settings: ParameterSet) -> None:
         stereo = settings.get(StereoParameters)
-        cv2.setNumThreads(stereo.threads or -1)
+        limit_threads(stereo.threads)
         self._stereo.set_parameters(stereo, settings.get(PairingParameters))
 
     def _on_request(self, message: TrackRequest) -> None:
@@ -70,25 +71,32 @@ class EdgeMetricNode(StereoNode):
         models = self._stereo.models_for(pair.left.pixels)
         with self._times.measure("metric"):
             edge = self._measurement.edge(pair.left.pixels, pair.right.pixels)
+        if self._edge_publisher.get_subscription_count() or self._error_publisher.get_subscription_count():
+            self._publish_fovea(edge, models, header, skew_s)
+        self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
+        self._times.add_all(edge.stage_s)
+        self._publish_track(pair, edge, models)
+        if self._overlay_publisher.get_subscription_count():
+            with self._times.measure("overlay"):
+                disparity = self._measurement.disparity(edge)
+                picture = draw_overlay(pair.left.pixels, edge, disparity)
+                self._overlay_publisher.publish(array_to_image(picture, header))
+        self._measurement.update_alignment()
+        self._failure = None
+
+    def _publish_fovea(self, edge: EdgeMetricResult, models: Models | None, header: Header, pair_skew_s: float) -> None:
         with self._times.measure("disparity"):
             disparity = self._measurement.disparity(edge)
         angular = models and angular_disparity(
             *models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px
         )
         with self._times.measure("publish"):
-            error = error_message(disparity, angular, header, skew_s)
+            error = error_message(disparity, angular, header, pair_skew_s)
             verged = self._measurement.verged(edge, error.horizontal_px, error.confidence)
-            self._edge_publisher.publish(edge_message(edge, verged, header, skew_s))
             self._error_publisher.publish(error)
-        self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
-        self._times.add_all(edge.stage_s)
-        self._publish_track(pair, edge, models)
-        if self._overlay_publisher.get_subscription_count():
-            with self._times.measure("overlay"):
-                picture = draw_overlay(pair.left.pixels, edge, disparity)
-                self._overlay_publisher.publish(array_to_image(picture, header))
-        self._measurement.update_alignment()
-        self._failure = None
+            if self._edge_publisher.get_subscription_count():
+                # Its arrays are measured only now.
+                self._edge_publisher.publish(edge_message(edge, verged, header, pair_skew_s))
 
     def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, models: Models | None) -> None:
         with self._times.measure("tracker"):

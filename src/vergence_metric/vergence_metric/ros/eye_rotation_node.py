@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import cv2
 from sensor_msgs.msg import JointState
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
@@ -25,20 +24,20 @@ from vergence_metric.eye_rotation.resting_pairs import measure_pair
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters
 from vergence_metric.ros.eye_rotation_messages import eye_rotation_message
+from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.stereo_node import StereoNode
 from vergence_msgs.msg import EyeRotation
 from vergence_rig.rig import load_rig
 
 
-class EyeRotationNode(StereoNode):
+class EyeRotationNode(MetricNode):
     """Measures `rate_hz` pairs a second on its own thread; the pair before each shows the image's motion."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("eye_rotation_node", **options)
         self._settings = declare(self, GROUPS)
         root = self._settings.get(EyeRotationNodeParameters)
-        cv2.setNumThreads(root.threads or -1)
+        limit_threads(root.threads)
         self._rig = load_rig(root.rig)
         self._encoder = VisualEncoder(_encoder_parameters(self._settings), self._rig)
         self._selection: PairSelection[ImagePair] = PairSelection(root.rate_hz)
@@ -46,19 +45,22 @@ class EyeRotationNode(StereoNode):
         self._last = "nothing measured yet"
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
-        self._publisher = qos.create_publisher(EyeRotation, "vergence/eye_rotation")
+        self._publisher = self._output(qos, EyeRotation, "vergence/eye_rotation")
         self._worker: LatestWorker[tuple[ImagePair, ImagePair]] = LatestWorker(
             self._measure, self._on_failure, "encoder"
         )
         pairing = self._settings.get(PairingParameters)
-        self._stereo = StereoInput(self, root, pairing, diagnostics, qos, self._on_pair, self._selection.is_due)
+        self._stereo = StereoInput(
+            self, root, pairing, diagnostics, qos, self._on_pair, self._selection.is_due, self._images
+        )
         self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
         self._settings.on_change(self._on_settings)
         diagnostics.add("encoder", self._report)
+        diagnostics.add("outputs", self._report_outputs)
 
     def _on_settings(self, settings: ParameterSet) -> None:
         root = settings.get(EyeRotationNodeParameters)
-        cv2.setNumThreads(root.threads or -1)
+        limit_threads(root.threads)
         self._encoder = VisualEncoder(_encoder_parameters(settings), self._rig)
         self._selection.rate_hz = root.rate_hz
         self._stereo.set_parameters(root, settings.get(PairingParameters))

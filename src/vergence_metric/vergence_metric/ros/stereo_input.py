@@ -1,7 +1,9 @@
 """Image messages of both eyes to pairs of arrays; shared by the nodes that measure pairs."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import partial
 from time import monotonic, monotonic_ns
 from typing import Any
 
@@ -17,6 +19,7 @@ from std_msgs.msg import Header
 from vergence_common.awaited import report_awaited
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.images import ImageError, compressed_to_array, image_to_array
+from vergence_common.local_images import LocalImages
 from vergence_common.qos import IMAGE_QOS, QosWatch
 from vergence_common.stamps import to_nanoseconds
 from vergence_metric.pairs.pairing import LEFT, RIGHT, Pair, StereoPairer
@@ -59,7 +62,8 @@ class StereoInput:
 
     `on_pair` runs in the executor's thread and should only hand the pair on. `models` holds the left and the right
     camera model by camera_info, None before the first. With `is_due`, only pairs for whose left stamp [ns] it is true
-    are decoded; the others only count as received.
+    are decoded; the others only count as received. With `images`, those that a node of this process has are taken from
+    there; others are subscribed, decoded at once and handed on.
     """
 
     def __init__(
@@ -71,6 +75,7 @@ class StereoInput:
         qos: QosWatch,
         on_pair: Callable[[ImagePair], None],
         is_due: Callable[[int], bool] | None = None,
+        images: LocalImages | None = None,
     ) -> None:
         self.models: list[CameraModel | None] = [None, None]
         self.decode_times = StageTimes()
@@ -91,13 +96,43 @@ class StereoInput:
         self._to_pixels: Callable[[Any], npt.NDArray[np.uint8]] = compressed_to_array if compressed else image_to_array
         self._health = tuple(StreamHealth(f"{name}/{suffix}", monotonic()) for name in SIDES)
         self._subscriptions: list[Subscription] = []
+        self._images, self._topics = images, [node.resolve_topic_name(f"{name}/image_raw") for name in SIDES]
+        self._lock = images.lock if images else nullcontext()
+        self._connect = partial(self._subscribe_all, qos, message_type, suffix, images)
+        self._connect()
         for side, name in enumerate(SIDES):
-            self._subscribe(qos, message_type, f"{name}/{suffix}", self._on_image, side, IMAGE_QOS)
-            self._subscribe(qos, CameraInfo, f"{name}/camera_info", self._on_info, side, _INFO_QOS)
             diagnostics.add(f"{name} images", lambda side=side: self._stream_report(side))  # type: ignore[misc]
         diagnostics.add("pairs", self._pairs_report)
         diagnostics.add("cameras", self._cameras_report)
         report_awaited(node, lambda: [health.topic for health in self._health if not health.received], _SOURCES)
+
+    @property
+    def paused(self) -> bool:
+        """True while nothing is received, since `pause`."""
+        return not self._subscriptions and self._images is None
+
+    def pause(self) -> None:
+        """Receive nothing until `resume`; images shared with other nodes of the process are received all the same."""
+        if self._images is None:
+            for subscription in self._subscriptions:
+                self._node.destroy_subscription(subscription)
+            self._subscriptions.clear()
+
+    def resume(self) -> None:
+        """Receive images again after `pause`."""
+        if self.paused:
+            self._health = tuple(StreamHealth(health.topic, monotonic()) for health in self._health)
+            self._connect()
+
+    def _subscribe_all(self, qos: QosWatch, message_type: Any, suffix: str, images: LocalImages | None) -> None:
+        for side, name in enumerate(SIDES):
+            if images is not None and images.offers(self._topics[side]):
+                images.receive(self._topics[side], partial(self._on_local, side))
+            else:
+                self._subscribe(qos, message_type, f"{name}/{suffix}", self._on_image, side, IMAGE_QOS)
+                if images is not None:
+                    images.offer(self._topics[side])
+            self._subscribe(qos, CameraInfo, f"{name}/camera_info", self._on_info, side, _INFO_QOS)
 
     def set_parameters(self, stereo: StereoParameters, pairing: PairingParameters) -> None:
         """Use these from the next image on; the transport stays as it is."""
@@ -112,8 +147,25 @@ class StereoInput:
 
         self._subscriptions.append(qos.create_subscription(kind, topic, receive, profile))
 
+    def _on_local(self, side: int, header: Header, pixels: npt.NDArray[np.uint8]) -> None:
+        """Receive an image in the thread that delivers it."""
+        self._on_frame(side, ImageFrame(header, pixels, monotonic_ns()))
+
+    def _on_frame(self, side: int, frame: ImageFrame) -> None:
+        stamp_ns, now_ns = to_nanoseconds(frame.header.stamp), frame.arrived_ns
+        age_s = (self._node.get_clock().now().nanoseconds - stamp_ns) * 1e-9
+        self._health[side].accept(now_ns * 1e-9, age_s, (frame.pixels.shape[1], frame.pixels.shape[0]))
+        self._emit(self._pairer.add(side, stamp_ns, frame, now_ns))
+
     def _on_image(self, side: int, message: Any) -> None:
         now_ns = monotonic_ns()
+        if self._images is not None:
+            shared = self._decoded(side, message, now_ns)
+            if shared is not None:
+                with self._lock:
+                    self._on_frame(side, shared)
+                    self._images.deliver(self._topics[side], shared.header, shared.pixels)
+            return
         health = self._health[side]
         stamp_ns = to_nanoseconds(message.header.stamp)
         age_s = (self._node.get_clock().now().nanoseconds - stamp_ns) * 1e-9
@@ -138,10 +190,10 @@ class StereoInput:
             return None
 
     def _decoded_pair(self, pair: Pair[Any]) -> ImagePair | None:
-        if self._is_due is None:
-            return pair
-        if not self._is_due(pair.left_stamp_ns):
+        if self._is_due is not None and not self._is_due(pair.left_stamp_ns):
             return None
+        if isinstance(pair.left, ImageFrame):
+            return pair
         left, right = (
             self._decoded(side, frame.message, frame.arrived_ns) for side, frame in enumerate((pair.left, pair.right))
         )
@@ -153,7 +205,8 @@ class StereoInput:
 
     def _on_deadline(self) -> None:
         self._deadline.cancel()
-        self._emit(self._pairer.expire(monotonic_ns()))
+        with self._lock:
+            self._emit(self._pairer.expire(monotonic_ns()))
 
     def _emit(self, pairs: list[Pair[Any]]) -> None:
         deadline_ns = self._pairer.deadline_ns
@@ -195,7 +248,10 @@ class StereoInput:
 
     def _stream_report(self, side: int) -> Report:
         health = self._health[side]
-        publishers = self._node.count_publishers(self._node.resolve_topic_name(health.topic))
+        if self.paused:
+            return Report(OK, f"{health.topic} is not received: nothing subscribes to what is measured in it")
+        local = self._images is not None and self._images.offers(self._topics[side])
+        publishers = int(local) or self._node.count_publishers(self._node.resolve_topic_name(health.topic))
         status = health.status(monotonic(), publishers, self._stereo.stalled_after_s)
         late = self._pairer.statistics.late[side]
         return Report(OK if status.ok else ERROR, status.message, status.values | {"out_of_order": late})

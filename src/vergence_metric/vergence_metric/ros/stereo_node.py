@@ -1,38 +1,34 @@
-"""Base of the nodes that measure pairs of images: joint history, stage times, and the report of a failed pair."""
+"""stereo_node: edge metric, boxes and eye rotation in one process; images are received, decoded and paired once."""
 
-import traceback
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
 
-from vergence_common.stamps import to_nanoseconds
-from vergence_metric.pairs.latest_worker import LatestWorker
-from vergence_metric.pairs.stage_times import StageTimes
-from vergence_rig.joint_history import JointHistory
+from vergence_common.composition import Composition, parse
+from vergence_common.local_images import LocalImages
+from vergence_common.node_main import run_nodes
+from vergence_metric.ros.box_metric_node import BoxMetricNode
+from vergence_metric.ros.edge_metric_node import EdgeMetricNode
+from vergence_metric.ros.eye_rotation_node import EyeRotationNode
+
+METRICS: dict[str, Callable[..., Node]] = {
+    "edge_metric_node": EdgeMetricNode,
+    "box_metric_node": BoxMetricNode,
+    "eye_rotation_node": EyeRotationNode,
+}
 
 
-class StereoNode(Node):
-    """Measures pairs on its own thread. Subclasses must set `_worker`, and clear `_failure` after a measured pair."""
+def metric_makers(composition: Composition, images: LocalImages) -> list[Callable[[], Node]]:
+    """Return what makes each chosen metric node; the first receives the images that `images` does not offer."""
+    return [
+        partial(METRICS[name], images=images, cli_args=arguments)
+        for name, arguments in composition.own.items()
+        if name in METRICS
+    ]
 
-    _worker: LatestWorker[Any]
 
-    def __init__(self, name: str, **options: Any) -> None:
-        super().__init__(name, **options)
-        self._joints = JointHistory()
-        self._times = StageTimes()
-        self._failure: str | None = None
-
-    def close(self) -> None:
-        """End the measuring thread."""
-        self._worker.close()
-
-    def _on_joints(self, message: JointState) -> None:
-        self._joints.add(to_nanoseconds(message.header.stamp), message.name, message.position)
-
-    def _on_failure(self, error: Exception) -> None:
-        if not self.context.ok():
-            return  # shut down while a pair was being measured
-        self._failure = f"{type(error).__name__}: {error}"
-        text = "".join(traceback.format_exception(error))
-        self.get_logger().error(f"measuring a pair failed:\n{text}", throttle_duration_sec=10.0)
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the chosen metric nodes."""
+    composition = parse(list(METRICS), list(METRICS), "Measure pairs of images: all metrics in one process.", args)
+    return run_nodes(metric_makers(composition, LocalImages()), composition.common)

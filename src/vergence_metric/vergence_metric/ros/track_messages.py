@@ -39,6 +39,8 @@ def track_message(
         reason=track.reason,
         candidate_disparity_px=[disparity_px for disparity_px, _ in track.candidates],
         candidate_weight=[weight for _, weight in track.candidates],
+        contrast_window_px=result.least_contrast.window_px,
+        contrast=result.least_contrast.contrast,
     )
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,14 +22,21 @@ class EyeView:
 
     def direction(self, pixel: Pixel) -> np.ndarray:
         """Return the unit direction (3,) in rig_base of a pixel."""
-        ray = self.camera.pixel_to_ray(np.array([pixel]))[0]
-        return np.asarray(rotation_rig_from_optical(self.pan_rad, self.tilt_rad) @ ray)
+        x, y = self.camera.undistort((pixel,))[0].tolist()
+        length = math.sqrt(x * x + y * y + 1.0)
+        return np.asarray(self._rig_from_optical @ np.array((x / length, y / length, 1.0 / length)))
 
     def pixel(self, direction: np.ndarray) -> Pixel:
         """Return the pixel of a direction (3,) in rig_base; NaN behind the eye."""
-        ray = rotation_rig_from_optical(self.pan_rad, self.tilt_rad).T @ direction
-        u, v = self.camera.ray_to_pixel(ray[None, :])[0]
-        return float(u), float(v)
+        x, y, z = (direction @ self._rig_from_optical).tolist()
+        if not z > 0.0:
+            return math.nan, math.nan
+        u, v = self.camera.distort(((x / z, y / z),))[0].tolist()
+        return u, v
+
+    @cached_property
+    def _rig_from_optical(self) -> np.ndarray:
+        return rotation_rig_from_optical(self.pan_rad, self.tilt_rad)
 
 
 def distance(a: Pixel, b: Pixel) -> float:

@@ -16,6 +16,7 @@ _MOTION_MEMORY = 0.6  # share of the old angular velocity kept at each frame
 _COAST_HALF_LIFE_S = 0.7  # a hidden target's predicted velocity fades: it may have stopped
 _COAST_FROM_S = 0.3  # a hidden target is predicted by its velocity over this time, not by its last two sightings
 _SLOPE_OVER_S = 0.06
+_SEGMENTED_EVERY = 32
 
 
 @dataclass
@@ -38,6 +39,17 @@ class Target:
     found: bool = True  # since its request
     goal_id: int = 0
     sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # recent stamps and directions
+    unbounded_pairs: int = 0  # in which it might have been segmented
+
+    def segmentation_due(self) -> bool:
+        """Count a pair in which a target without bounds could be segmented; returns whether it is to be tried.
+
+        The 1st, 2nd, 4th, 8th time and so on, then every 32nd: what has no bounds in one pair hardly has them in the
+        next, and looking for them costs as much as all the rest.
+        """
+        self.unbounded_pairs += 1
+        n = self.unbounded_pairs
+        return n & (n - 1) == 0 or n % _SEGMENTED_EVERY == 0
 
     def predicted(self, stamp_s: float) -> np.ndarray:
         """Return the predicted direction (3,) at a stamp."""

@@ -208,10 +208,10 @@ class TargetTracker:
             if abs(jump) > p.disparity_jump_px and sighting.similarity < _UNMISTAKABLE_SIMILARITY:
                 target.hidden = True
                 return self._hidden(target, f"disparity at the target's position differs by {jump:+.1f} px: occluded")
-        if disparity.ok and not target.bounded:
+        if disparity.ok and not target.bounded and target.segmentation_due():
             point, extent, disparity = self._segmenter.segment(left, right, sighting.pixel, disparity, views)
             if extent is not None:
-                # Locked before the right eye saw it; now its region can be segmented.
+                # It had no bounds when it was locked: the right eye did not see it yet, or the eyes stood otherwise.
                 target.aside_px, target.bounded = offset_inside(sighting.pixel, point, extent), True
                 sighting = replace(sighting, pixel=point)
                 target.appearance = TargetAppearance(left, point, extent)
