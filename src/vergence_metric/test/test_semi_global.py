@@ -291,7 +291,8 @@ def test_a_thin_rod_is_matched_by_its_own_pixels(width_px, most_wrong):
 
 
 def test_the_tall_window_sees_the_rod_where_square_ones_see_the_background():
-    pair = pair_about(*rod(5, 40, 0, 3), POINT, PARAMETERS)
+    left, right = rod(5, 40, 0, 3)
+    pair = pair_about(left, right, POINT, PARAMETERS)
     tall, square = column(pair, 0, (-100, 100), PARAMETERS), profiles(pair, PARAMETERS)[2]
     assert tall.at(40.0) > 0.8 > tall.at(0.0)
     assert square.at(0.0) > square.at(40.0)
