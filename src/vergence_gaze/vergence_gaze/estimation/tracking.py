@@ -136,8 +136,6 @@ class TargetTracking(TargetEstimator):
         accepted = self._consider(sighting, now_s)
         if accepted:
             self.ambiguity = self._ambiguity_of(track) if track.ambiguous and self._class is None else ""
-        if accepted and self._class is None:
-            self._observe_play(track.stamp_s, track.skew_s)
         return accepted
 
     def update_box(self, box: BoxSighting, now_s: float) -> bool:
@@ -185,6 +183,8 @@ class TargetTracking(TargetEstimator):
             measurement, seen_rad = directions.shifted(measurement, seen_rad, self._class_gate.beside_rad)
         if direction_only:
             measurement, seen_rad = directions.without_depth(measurement, seen_rad)
+        if sighting.source == "track" and self._class is None:
+            self._observe_play(sighting.stamp_s, sighting.skew_s, seen_rad)
         if not self.filter.initialised:
             self.initialise_from(measurement)
         accepted = self.update(measurement, seen_rad, sighting.skew_s, now_s, sighting.source)
@@ -205,12 +205,14 @@ class TargetTracking(TargetEstimator):
                 distances_m.append("far away")
         return f"{track.reason}: {', '.join(distances_m)}" if len(distances_m) > 1 else track.reason
 
-    def _observe_play(self, stamp_s: float, skew_s: float) -> None:
-        """Learn the joints' play from a target at rest that eyes at rest have just seen."""
+    def _observe_play(self, stamp_s: float, skew_s: float, seen_rad: Array) -> None:
+        """Learn the joints' play from a target at rest that eyes at rest have just seen at these angles (3,)."""
         first, last = sorted((stamp_s, stamp_s + skew_s))
-        if self.filter.moving or self.visual is None or self._history.speed_within(first - _RESTED_S, last) > 0.0:
+        if self.filter.moving or self._history.speed_within(first - _RESTED_S, last) > 0.0:
             return
-        self._history.play.observe(stamp_s, self._history.reported_at(stamp_s), self.visual.error_rad)
+        at_left, at_right = self._history.shaft_at(stamp_s), self._history.shaft_at(last)
+        axes_rad = np.array([at_left[0], at_right[1], at_left[2]])
+        self._history.play.observe(stamp_s, self._history.reported_at(stamp_s), seen_rad - axes_rad)
 
 
 __all__ = ["SightingError", "TargetTracking"]
