@@ -171,7 +171,7 @@ def test_joint_states_that_do_not_reach_the_image_leave_the_track_unlocked(graph
     graph.diagnostic("cameras", lambda s: s.level == DiagnosticStatus.OK)
     _, _, track = answers(graph, eyes, view(0), view(7))
     assert track.status == TargetTrack.STATUS_UNLOCKED
-    assert track.reason == "no joint_states at the image's stamp"
+    assert track.reason == "no joint_states at the image's stamp: the newest is 10.03 s older"
 
 
 def broken(message: Image, **changes: Any) -> Image:

@@ -50,6 +50,7 @@ class GazeController:
         self._command_s = math.nan
         self._send_until_s = -math.inf
         self._beyond_limits = False
+        self._joint_fault = ""
         self._perception = Perception(rig, parameters, _driven(parameters))
         self._configure(parameters)
         self._active = self._verges_on_sight = parameters.control.start == "verge"
@@ -101,7 +102,7 @@ class GazeController:
         try:
             if not self._enabled:
                 raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
-            request = resolve_goal(goal, self._rig, self._p, self._perception.history, now_s)
+            request = resolve_goal(goal, self._rig, self._p, self._perception.history, now_s, self._joint_fault)
         except GoalError as error:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
@@ -154,11 +155,13 @@ class GazeController:
             self._perception.tracking.clear()
             self._requests.free()
 
-    def step(self, now_s: float, observations: Iterable[Observation] = ()) -> Command:
+    def step(self, now_s: float, observations: Iterable[Observation] = (), joint_fault: str = "") -> Command:
         """Update by what arrived since the last cycle and return what to command now.
 
+        `joint_fault` says why no usable joint_states arrive, as whoever reads them reports it; empty while they do.
         If the clock runs back by more than a second, the eyes hold still and everything starts again.
         """
+        self._joint_fault = joint_fault
         if now_s < self._command_s - _CLOCK_JUMP_S:
             self._perception.on_clock_reset()
             self._command_s = now_s
@@ -312,7 +315,8 @@ class GazeController:
         self._phases.enter(Phase.IDLE, reason, now_s)
 
     def _report(self, now_s: float) -> GazeReport:
-        return make_report(now_s, self._perception, self._phases, self._law.name, self._p.control.mode, self._rig)
+        law, mode = self._law.name, self._p.control.mode
+        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, self._joint_fault)
 
 
 def _driven(parameters: GazeParameters) -> npt.NDArray[np.bool_]:

@@ -16,6 +16,8 @@ from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
 
+NO_JOINTS = "no joint_states have arrived"
+
 
 @dataclass(frozen=True)
 class GazeReport:
@@ -57,15 +59,21 @@ class Command:
 
 
 def make_report(
-    now_s: float, perception: Perception, phases: PhaseMachine, law: str, mode: str, rig: Rig
+    now_s: float,
+    perception: Perception,
+    phases: PhaseMachine,
+    law: str,
+    mode: str,
+    rig: Rig,
+    joint_fault: str = "",
 ) -> GazeReport:
-    """Return the state at `now_s` under this law and mode."""
+    """Return the state at `now_s` under this law and mode; `joint_fault` says why no joint is known, if none is."""
     known = perception.history.known and math.isfinite(now_s)
     joints = perception.history.shaft_rad if known else np.full(3, math.nan)
     estimate = perception.tracking.estimate(now_s) if known else None
     residual = residual_of(estimate, joints)
     fixation, miss = fixation_of_joints(joints, rig.baseline_m)
-    reason = phases.reason if known else "waiting for joint_states: none have arrived"
+    reason = phases.reason if known else f"waiting: {joint_fault or NO_JOINTS}"
     if phases.phase is Phase.VERGE and not perception.judge.verged:
         reason = f"{reason}; {perception.tracking.note or perception.judge.reason}"
     return GazeReport(

@@ -12,12 +12,13 @@ from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
 from vergence_common.diagnostics import OK, WARN, Diagnostics, Report
+from vergence_common.joint_states import JointStateInput
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_seconds
 from vergence_gaze.control.controller import GazeController
-from vergence_gaze.control.report import Command, GazeReport
+from vergence_gaze.control.report import NO_JOINTS, Command, GazeReport
 from vergence_gaze.estimation.observations import Observation, PointSighting
 from vergence_gaze.joints.frames import FrameError
 from vergence_gaze.parameter_groups import collected, gaze_groups
@@ -67,7 +68,7 @@ class GazeControllerNode(Node):
         self._state = watch.create_publisher(GazeState, "gaze/state")
         self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point")
         self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1))
-        watch.create_subscription(JointState, "joint_states", lambda m: self._add(convert.joint_report(m)))
+        self._joint_input = JointStateInput(self, diagnostics, watch, lambda j: self._add(convert.joint_report(j)))
         # Latched: one message per start of the servos' driver.
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         watch.create_subscription(
@@ -136,7 +137,7 @@ class GazeControllerNode(Node):
         now_s = self._now_s()
         self._look_at.forward_cancels(now_s)
         arrived, self._arrived = self._arrived, []
-        command = self._controller.step(now_s, arrived)
+        command = self._controller.step(now_s, arrived, self._joint_input.problem())
         self._newest = command.report
         self._cycles += 1
         self._look_at.on_cycle(command)
@@ -176,7 +177,7 @@ class GazeControllerNode(Node):
     def _report(self) -> Report:
         report, encoder = self._newest, self._controller.vergence_offset
         if report is None or not math.isfinite(report.tilt_rad):
-            return Report(WARN, "waiting for joint_states: none have arrived", {"cycles": self._cycles})
+            return Report(WARN, f"waiting: {self._joint_input.problem() or NO_JOINTS}", {"cycles": self._cycles})
         values = {"law": report.law, "mode": report.mode, "verged": report.verged, "cycles": self._cycles}
         values |= {"eye_rotations_accepted": encoder.accepted, "eye_rotations_rejected": encoder.rejected}
         if encoder.rejection:

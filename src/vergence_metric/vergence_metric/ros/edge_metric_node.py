@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from time import monotonic_ns
 from typing import Any
 
-from sensor_msgs.msg import Image, JointState
+from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
@@ -51,7 +51,7 @@ class EdgeMetricNode(MetricNode):
         self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
         pairing = self._settings.get(PairingParameters)
         self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit, images=self._images)
-        self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
+        self._joint_input = self._subscribe_joints(diagnostics, qos)
         self._request_subscription = qos.create_subscription(TrackRequest, "vergence/track_request", self._on_request)
         self._settings.on_change(self._on_settings)
         diagnostics.add("measurement", self._report)
@@ -106,7 +106,8 @@ class EdgeMetricNode(MetricNode):
                 (stamp_ns * 1e-9, angles)
                 for stamp_ns, angles in self._joints.samples_between(now_ns - _JOINT_SAMPLES_NS, now_ns)
             ]
-            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models, samples)
+            why = "" if eyes is not None else self._joints.gap(max(now_ns, pair.right_stamp_ns))
+            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models, samples, why)
         angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
         self._track_publisher.publish(track_message(track, edge, angular, pair.left.header, pair.skew_ns * 1e-9))
 
