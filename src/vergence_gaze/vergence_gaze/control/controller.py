@@ -16,6 +16,7 @@ from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
 from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, resolve_goal
+from vergence_gaze.joints.feedback import FeedbackMonitor
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.limits import CommandLimits
 from vergence_gaze.joints.resolution import pulse_steps_rad, rig_with_steps
@@ -50,7 +51,7 @@ class GazeController:
         self._command_s = math.nan
         self._send_until_s = -math.inf
         self._beyond_limits = False
-        self._joint_fault = ""
+        self._feedback = FeedbackMonitor()
         self._perception = Perception(rig, parameters, _driven(parameters))
         self._configure(parameters)
         self._active = self._verges_on_sight = parameters.control.start == "verge"
@@ -102,12 +103,13 @@ class GazeController:
         try:
             if not self._enabled:
                 raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
-            request = resolve_goal(goal, self._rig, self._p, self._perception.history, now_s, self._joint_fault)
+            request = resolve_goal(goal, self._rig, self._p, self._perception.history, now_s, self._feedback.fault)
         except GoalError as error:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
         self._goals.end(Result.PREEMPTED, "preempted by a newer goal", now_s)
         self._goals.start(goal_id, goal, now_s, self._p)
+        self._feedback.retry()
         self._active, self._pose, self._verges_on_sight = True, None, False
         self._perception.judge.restart()
         self._law.reset()
@@ -161,16 +163,21 @@ class GazeController:
         `joint_fault` says why no usable joint_states arrive, as whoever reads them reports it; empty while they do.
         If the clock runs back by more than a second, the eyes hold still and everything starts again.
         """
-        self._joint_fault = joint_fault
         if now_s < self._command_s - _CLOCK_JUMP_S:
             self._perception.on_clock_reset()
+            self._feedback.clear()
             self._command_s = now_s
             self._restart("the clock was set back", self._p, now_s)
         for observation in observations:
             self._observe(observation, now_s)
-        if not self._perception.history.known or not math.isfinite(now_s):
-            return Command(None, self._report(now_s), self._goals.pop_outcomes())
         sending = self._enabled and (self._active or now_s < self._send_until_s)
+        last_sent, history = (self._command if sending else None), self._perception.history
+        if not math.isfinite(now_s):
+            return Command(None, self._report(now_s), self._goals.pop_outcomes())
+        fault = self._feedback.update(now_s, history, last_sent, self._driven, joint_fault)
+        self._goals.update_feedback(fault, now_s)
+        if not history.known:
+            return Command(None, self._report(now_s), self._goals.pop_outcomes())
         if self._command is None or not sending:
             # While idle, others may move the joints: start from where they are.
             self._command, self._command_s = self._limits.nearest(self._perception.history.reported_rad), now_s
@@ -182,7 +189,8 @@ class GazeController:
         self._command, self._command_s = sent, max(now_s, self._command_s)
         if sending:
             self._perception.history.on_command(now_s)
-        self._update_goal(now_s)
+        if not fault:
+            self._update_goal(now_s)
         joints_rad = sent if sending else None
         return Command(joints_rad, self._report(now_s), self._goals.pop_outcomes(), self._requests.pop())
 
@@ -212,6 +220,8 @@ class GazeController:
 
     def _decide(self, now_s: float, command: Array) -> Array:
         """Return the desired joint angles (3,), NaN for joints that stay."""
+        if self._feedback.fault:
+            return self._wait_for_feedback(now_s)
         if self._pose is not None:
             self._phases.enter(Phase.SACCADE, "turning to the requested angles", now_s)
             return self._pose
@@ -232,6 +242,14 @@ class GazeController:
         if phase is Phase.SACCADE and self._perception.judge.verged:
             self._perception.judge.restart("a saccade to the target is under way")
         return self._law.compute_command(self._control_input(now_s, command))
+
+    def _wait_for_feedback(self, now_s: float) -> Array:
+        """Let the joints stay where they were sent: without feedback nothing is searched, pursued or verged on."""
+        self._searcher.stop()
+        self._law.reset()
+        self._perception.judge.restart(self._feedback.fault)
+        self._phases.enter(Phase.LOST, self._feedback.fault, now_s)
+        return _UNKNOWN
 
     def _control_input(self, now_s: float, command: Array) -> ControlInput:
         return ControlInput(
@@ -316,7 +334,7 @@ class GazeController:
 
     def _report(self, now_s: float) -> GazeReport:
         law, mode = self._law.name, self._p.control.mode
-        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, self._joint_fault)
+        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, self._feedback.fault)
 
 
 def _driven(parameters: GazeParameters) -> npt.NDArray[np.bool_]:

@@ -130,6 +130,10 @@ class Perception:
         images_arrive = now_s - self.image_s < self._p.control.no_images_s
         return max(0.0, (self.image_s if images_arrive else now_s) - seen_s)
 
+    def images_missing(self, now_s: float) -> bool:
+        """Return whether no results from images have arrived for so long that goals fail."""
+        return not now_s - self.image_s <= self._p.control.no_images_s
+
     def eyes_still(self, now_s: float, command_rad: Array, at_rest: bool = False) -> bool:
         """Return whether the joints rest where commanded (3,), or turn along with the target unless `at_rest`."""
         along = np.zeros(3) if at_rest else self.tracking.joint_rates_rad_s(now_s)

@@ -11,6 +11,7 @@ from vergence_gaze.phases import Phase
 _LIMITED_S = 0.5
 _LOST_S = 2.5
 _AMBIGUOUS_S = 3.0
+_NO_FEEDBACK_S = 2.0
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class GoalMonitor:
         self._outcomes: list[Outcome] = []
         self._goal_id: int | None = None
         self._since_s = self._limit_s = math.nan
-        self._limited_since_s = self._ambiguous_since_s = math.nan
+        self._limited_since_s = self._ambiguous_since_s = self._faulty_since_s = math.nan
 
     @property
     def goal_id(self) -> int | None:
@@ -63,7 +64,7 @@ class GoalMonitor:
         """Make a goal the active one."""
         self._goal_id, self._since_s = goal_id, now_s
         self._limit_s = goal.time_limit_s or parameters.control.time_limit_s
-        self._limited_since_s = self._ambiguous_since_s = math.nan
+        self._limited_since_s = self._ambiguous_since_s = self._faulty_since_s = math.nan
 
     def end(self, result: Result, reason: str, now_s: float) -> None:
         """End the active goal, if there is one."""
@@ -75,6 +76,13 @@ class GoalMonitor:
         """Return and remove the outcomes since the last call."""
         outcomes, self._outcomes = tuple(self._outcomes), []
         return outcomes
+
+    def update_feedback(self, fault: str, now_s: float) -> None:
+        """End the active goal if the joints' feedback has had a fault for too long; "" while it has none."""
+        self._faulty_since_s = _since(self._faulty_since_s, bool(fault), now_s)
+        late = fault and now_s - self._since_s > self._limit_s
+        if late or now_s - self._faulty_since_s > _NO_FEEDBACK_S:
+            self.end(Result.NO_FEEDBACK, fault, now_s)
 
     def update(self, p: Progress, parameters: GazeParameters) -> Result | None:
         """End the active goal if it is reached or can no longer be; returns the result, None while it goes on."""

@@ -11,14 +11,14 @@ from sensor_msgs.msg import CameraInfo, JointState
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
-from vergence_common.diagnostics import OK, WARN, Diagnostics, Report
+from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.joint_states import JointStateInput
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_seconds
 from vergence_gaze.control.controller import GazeController
-from vergence_gaze.control.report import NO_JOINTS, Command, GazeReport
+from vergence_gaze.control.report import Command, GazeReport
 from vergence_gaze.estimation.observations import Observation, PointSighting
 from vergence_gaze.joints.frames import FrameError
 from vergence_gaze.parameter_groups import collected, gaze_groups
@@ -176,12 +176,19 @@ class GazeControllerNode(Node):
 
     def _report(self) -> Report:
         report, encoder = self._newest, self._controller.vergence_offset
-        if report is None or not math.isfinite(report.tilt_rad):
-            return Report(WARN, f"waiting: {self._joint_input.problem() or NO_JOINTS}", {"cycles": self._cycles})
+        if report is None:
+            return Report(WARN, "no control cycle yet")
+        if not math.isfinite(report.tilt_rad):
+            level = ERROR if self._joint_input.reader.received else WARN
+            return Report(level, report.reason, {"cycles": self._cycles})
         values = {"law": report.law, "mode": report.mode, "verged": report.verged, "cycles": self._cycles}
         values |= {"eye_rotations_accepted": encoder.accepted, "eye_rotations_rejected": encoder.rejected}
         if encoder.rejection:
             values["eye_rotation_rejection"] = encoder.rejection
+        if report.fault:
+            return Report(ERROR, report.reason, values)
+        if report.images_missing:
+            return Report(WARN, f"no results from the images arrive: {report.reason}", values)
         return Report(OK, f"{report.phase.name.lower()}: {report.reason}", values)
 
 
