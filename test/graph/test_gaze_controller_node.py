@@ -51,6 +51,8 @@ class HeadNode(Node):
         self._answered_s = 0.0
         self.silent: set[str] = set()
         """Of "joints" and "images", what is not published."""
+        self.images_fault = ""
+        """If set, why tracks say that the images are unusable."""
         self._time = self.create_publisher(Clock, "/clock", 10)
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self._edge = self.create_publisher(EdgeVergence, "vergence/edge", 10)
@@ -112,6 +114,8 @@ class HeadNode(Node):
                 status=TargetTrack.STATUS_OK if seen.usable else TargetTrack.STATUS_LOST,
             )
             track.header.stamp = self._stamp(seen.stamp_s)
+            if self.images_fault:
+                track.status, track.reason = TargetTrack.STATUS_UNUSABLE_IMAGES, self.images_fault
             self._track.publish(track)
 
 
@@ -308,3 +312,17 @@ def test_the_diagnostic_is_not_ok_without_results_from_images(scene: Scene) -> N
     assert not scene.states[-1].verged
     scene.head_node.silent.clear()
     scene.diagnostic(lambda s: s.level == DiagnosticStatus.OK)
+
+
+def test_on_unusable_images_the_eyes_are_not_verged_and_the_cause_is_named(scene: Scene) -> None:
+    assert scene.result(scene.send(scene.pixel_goal())).result == LookAt.Result.VERGED
+    scene.head_node.images_fault = "the left image is frozen"
+    scene.until(lambda: not scene.states[-1].verged, "the eyes are no longer verged")
+    begin = len(scene.states)
+    scene.diagnostic(lambda s: s.level == DiagnosticStatus.ERROR and "the left image is frozen" in s.message)
+    assert "the left image is frozen" in scene.states[-1].reason
+    result = scene.result(scene.send(scene.pixel_goal()))
+    assert (result.result, result.reason) == (LookAt.Result.NO_IMAGES, "the left image is frozen")
+    assert not any(state.verged for state in scene.states[begin:])
+    scene.head_node.images_fault = ""
+    assert scene.result(scene.send(scene.pixel_goal())).result == LookAt.Result.VERGED

@@ -221,10 +221,14 @@ class GazeController:
     def _decide(self, now_s: float, command: Array) -> Array:
         """Return the desired joint angles (3,), NaN for joints that stay."""
         if self._feedback.fault:
-            return self._wait_for_feedback(now_s)
+            return self._wait(now_s)
         if self._pose is not None:
             self._phases.enter(Phase.SACCADE, "turning to the requested angles", now_s)
             return self._pose
+        if images_fault := self._perception.images_fault(now_s):
+            self._perception.judge.restart(images_fault)
+            if not self._perception.tracking.follows_stream:
+                return self._wait(now_s)
         unseen = not self._perception.unseen_s(now_s) <= self._p.target.lost_after_s
         if self._verges_on_sight and unseen and self._requests.ask_for_view(self._goals.new_id(), now_s):
             self._phases.enter(Phase.VERGE, "no goal: verging on what the left eye looks at", now_s)
@@ -243,12 +247,17 @@ class GazeController:
             self._perception.judge.restart("a saccade to the target is under way")
         return self._law.compute_command(self._control_input(now_s, command))
 
-    def _wait_for_feedback(self, now_s: float) -> Array:
-        """Let the joints stay where they were sent: without feedback nothing is searched, pursued or verged on."""
+    def _fault(self, now_s: float) -> str:
+        """Return what is wrong with the joints' feedback, or else with the images; "" if nothing is."""
+        return self._feedback.fault or self._perception.images_fault(now_s)
+
+    def _wait(self, now_s: float) -> Array:
+        """Let the joints stay where they were sent: during a fault nothing is searched, pursued or verged on."""
+        fault = self._fault(now_s)
         self._searcher.stop()
         self._law.reset()
-        self._perception.judge.restart(self._feedback.fault)
-        self._phases.enter(Phase.LOST, self._feedback.fault, now_s)
+        self._perception.judge.restart(fault)
+        self._phases.enter(Phase.LOST, fault, now_s)
         return _UNKNOWN
 
     def _control_input(self, now_s: float, command: Array) -> ControlInput:
@@ -310,6 +319,7 @@ class GazeController:
             by_class=self._perception.tracking.class_name is not None,
             pose_reached=pose_reached,
             ambiguity=self._perception.tracking.ambiguity,
+            images_fault=self._perception.images_fault(now_s),
             at_point=point.reached(now_s) if (point := self._perception.tracking.point) else "",
         )
         if self._goals.update(progress, self._p) is Result.VERGED and pose_reached:
@@ -334,7 +344,7 @@ class GazeController:
 
     def _report(self, now_s: float) -> GazeReport:
         law, mode = self._law.name, self._p.control.mode
-        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, self._feedback.fault)
+        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, self._fault(now_s))
 
 
 def _driven(parameters: GazeParameters) -> npt.NDArray[np.bool_]:

@@ -21,7 +21,8 @@ Array = npt.NDArray[np.float64]
 class GazeReport:
     """Angles are estimated, residuals (version, vergence, tilt) are what is left to turn; NaN where unknown.
 
-    `fault` says what is wrong with the joints' feedback, and `images_missing` whether no results of images arrive.
+    `fault` says what is wrong with the joints' feedback or the images, `images_missing` whether no results of images
+    arrive.
     `fixation_m` (3,) is the midpoint of the gaze rays' closest approach and `miss_distance_m` how far they pass.
     """
 
@@ -68,7 +69,7 @@ def make_report(
     rig: Rig,
     fault: str = "",
 ) -> GazeReport:
-    """Return the state at `now_s` under this law and mode; `fault` is that of the joints' feedback."""
+    """Return the state at `now_s` under this law and mode; `fault` is that of the feedback or the images."""
     known = perception.history.known and math.isfinite(now_s)
     joints = perception.history.shaft_rad if known else np.full(3, math.nan)
     estimate = perception.tracking.estimate(now_s) if known else None

@@ -18,9 +18,9 @@ _NO_FEEDBACK_S = 2.0
 class Progress:
     """The state that decides a goal, in one cycle. `pose_reached` is None unless the goal is a pose.
 
-    `at_point` says why an empty point counts as looked at and `ambiguity` which distances fit, each "" while that does
-    not hold; `verged_reason` says why the eyes are verged or not yet, `tracking_note` why the last measurement was
-    rejected.
+    `at_point` says why an empty point counts as looked at, `ambiguity` which distances fit, and `images_fault` why the
+    images may not be used, each "" while that does not hold; `verged_reason` says why the eyes are verged or not yet,
+    `tracking_note` why the last measurement was rejected.
     """
 
     now_s: float
@@ -35,6 +35,7 @@ class Progress:
     pose_reached: bool | None
     at_point: str = ""
     ambiguity: str = ""
+    images_fault: str = ""
 
 
 class GoalMonitor:
@@ -113,7 +114,7 @@ class GoalMonitor:
         if p.now_s - self._ambiguous_since_s > _AMBIGUOUS_S:
             return Result.AMBIGUOUS, p.ambiguity
         if p.now_s - max(p.image_s, self._since_s) > parameters.control.no_images_s:
-            return Result.NO_IMAGES, "no results from the images arrive"
+            return Result.NO_IMAGES, p.images_fault or "no results from the images arrive"
         if p.now_s - self._since_s > self._limit_s:
             if p.ambiguity:
                 return Result.AMBIGUOUS, p.ambiguity

@@ -100,7 +100,7 @@ class GazeControllerNode(Node):
     def _on_track(self, message: TargetTrack) -> None:
         if message.contrast_window_px:
             self._add(convert.track_contrast(message))
-        elif not self._reads_edges:
+        elif not self._reads_edges and message.status != TargetTrack.STATUS_UNUSABLE_IMAGES:
             # Another tracker says nothing of contrast: vergence/edge does, and costs both sides more.
             self._reads_edges = True
             self._watch.create_subscription(EdgeVergence, "vergence/edge", self._on_edge)

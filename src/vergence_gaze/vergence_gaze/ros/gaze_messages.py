@@ -67,6 +67,7 @@ def track_sighting(message: TargetTrack, left_camera: CameraModel) -> TrackSight
         goal_id=message.goal_id,
         ambiguous=message.status == TargetTrack.STATUS_AMBIGUOUS,
         candidates=tuple((math.atan(x) - math.atan(x - px / left_camera.fx_px), weight) for px, weight in candidates),
+        images_fault=message.reason if message.status == TargetTrack.STATUS_UNUSABLE_IMAGES else "",
     )
 
 
