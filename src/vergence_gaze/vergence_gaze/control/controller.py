@@ -175,7 +175,7 @@ class GazeController:
         if not math.isfinite(now_s):
             return Command(None, self._report(now_s), self._goals.pop_outcomes())
         fault = self._feedback.update(now_s, history, last_sent, self._driven, joint_fault)
-        self._goals.update_feedback(fault, now_s)
+        self._goals.update_feedback(fault, now_s, self._p)
         if not history.known:
             return Command(None, self._report(now_s), self._goals.pop_outcomes())
         if self._command is None or not sending:
