@@ -171,7 +171,7 @@ def test_joint_states_that_do_not_reach_the_image_leave_the_track_unlocked(graph
     graph.diagnostic("cameras", lambda s: s.level == DiagnosticStatus.OK)
     _, _, track = answers(graph, eyes, view(0), view(7))
     assert track.status == TargetTrack.STATUS_UNLOCKED
-    assert track.reason == "no joint_states at the image's stamp"
+    assert track.reason == "no joint_states at the image's stamp: the newest is 10.03 s older"
 
 
 def broken(message: Image, **changes: Any) -> Image:
@@ -376,3 +376,40 @@ def test_a_request_is_answered_with_its_goals_id(graph: Any, node: EdgeMetricNod
     assert (track.goal_id, track.status) == (9, TargetTrack.STATUS_OK), track.reason
     assert (track.left_x_px, track.left_y_px) == pytest.approx((100.0, 80.0), abs=0.5)
     assert track.disparity_px == pytest.approx(6.0, abs=0.3)
+
+
+def noisy(image: Pixels, random: np.random.Generator) -> Pixels:
+    return np.clip(image + random.normal(0.0, 2.0, image.shape), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("kind", ["frozen", "identical", "black"])
+def test_pictures_that_cannot_be_measured_are_named_and_their_figures_are_nan(
+    graph: Any, eyes: Eyes, kind: str
+) -> None:
+    random = np.random.default_rng(1)
+    for _ in range(9):
+        *_, track = answers(graph, eyes, noisy(view(0), random), noisy(view(7), random))
+    assert track.status != TargetTrack.STATUS_UNUSABLE_IMAGES
+    graph.diagnostic("pictures", lambda s: s.level == DiagnosticStatus.OK)
+    held, black = (noisy(view(0), random), noisy(view(7), random)), np.zeros_like(view(0))
+    for _ in range(18):
+        same = noisy(view(0), random)
+        left, right = {"frozen": held, "identical": (same, same), "black": (black, black)}[kind]
+        edge, error, track = answers(graph, eyes, left, right)
+    text = {"frozen": "is frozen", "identical": "one camera feeds both", "black": "is black"}[kind]
+    assert (track.status, error.status) == (
+        TargetTrack.STATUS_UNUSABLE_IMAGES,
+        VergenceError.STATUS_UNUSABLE_IMAGES,
+    )
+    assert text in track.reason
+    assert error.reason == track.reason
+    assert set(edge.status) == {EdgeVergence.STATUS_UNUSABLE_IMAGES}
+    assert not edge.verged
+    assert np.isnan(
+        [error.horizontal_px, track.contrast, track.left_x_px, *edge.contrast, *edge.left_to_right_px]
+    ).all()
+    status = graph.diagnostic("pictures", lambda s: text in s.message)
+    assert status.level == DiagnosticStatus.ERROR
+    *_, track = answers(graph, eyes, noisy(view(0), random), noisy(view(7), random))
+    assert track.status != TargetTrack.STATUS_UNUSABLE_IMAGES
+    graph.diagnostic("pictures", lambda s: s.level == DiagnosticStatus.OK)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PointStamped
 from rclpy.action import ActionClient
 from rclpy.context import Context
@@ -48,6 +49,10 @@ class HeadNode(Node):
         super().__init__("head", context=context)
         self.head = head
         self._answered_s = 0.0
+        self.silent: set[str] = set()
+        """Of "joints" and "images", what is not published."""
+        self.images_fault = ""
+        """If set, why tracks say that the images are unusable."""
         self._time = self.create_publisher(Clock, "/clock", 10)
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self._edge = self.create_publisher(EdgeVergence, "vergence/edge", 10)
@@ -86,6 +91,8 @@ class HeadNode(Node):
         return to_stamp(BEGIN_S + head_s)
 
     def _publish(self, seen: object) -> None:
+        if ("joints" if isinstance(seen, JointReport) else "images") in self.silent:
+            return
         if isinstance(seen, JointReport):
             message = JointState(name=list(seen.positions_rad), position=list(seen.positions_rad.values()))
             message.header.stamp = self._stamp(seen.stamp_s)
@@ -107,6 +114,8 @@ class HeadNode(Node):
                 status=TargetTrack.STATUS_OK if seen.usable else TargetTrack.STATUS_LOST,
             )
             track.header.stamp = self._stamp(seen.stamp_s)
+            if self.images_fault:
+                track.status, track.reason = TargetTrack.STATUS_UNUSABLE_IMAGES, self.images_fault
             self._track.publish(track)
 
 
@@ -128,6 +137,10 @@ class Scene:
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Spin until `condition` holds."""
         self._graph.wait_until(condition, what)
+
+    def diagnostic(self, wanted: Callable[[DiagnosticStatus], bool]) -> None:
+        """Wait for a report of the controller's own that is wanted."""
+        self._graph.diagnostic(": gaze", wanted)
 
     def pass_cycles(self, count: int) -> None:
         """Spin until the controller has gone through so many cycles more."""
@@ -273,3 +286,43 @@ def test_the_servos_real_resolution_is_used(scene: Scene) -> None:
     before = len(scene.head_node.commands)
     scene.pass_cycles(50)
     assert np.ptp(scene.head_node.commands[before:], axis=0).max() < 0.0077
+
+
+def test_joint_states_that_stop_are_named_and_the_search_stops(scene: Scene) -> None:
+    handle = scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cup", time_limit_s=ENDLESS_S))
+    scene.until(lambda: scene.states[-1].phase == GazeState.PHASE_SEARCH, "the search begins")
+    scene.head_node.silent.add("joints")
+    scene.until(lambda: "joint_states have stopped" in scene.states[-1].reason, "the reason is named")
+    scene.pass_cycles(5)  # what was sent before has arrived then
+    sent = len(scene.head_node.commands)
+    result = scene.result(handle)
+    assert (result.result, "joint_states have stopped" in result.reason) == (LookAt.Result.NO_FEEDBACK, True)
+    assert np.ptp(scene.head_node.commands[sent:], axis=0).max() == 0.0
+    scene.diagnostic(lambda s: s.level == DiagnosticStatus.ERROR and "joint_states have stopped" in s.message)
+    scene.head_node.silent.clear()
+    scene.until(lambda: "joint_states" not in scene.states[-1].reason, "the fault has ended")
+    assert scene.result(scene.send(scene.pixel_goal())).result == LookAt.Result.VERGED
+
+
+def test_the_diagnostic_is_not_ok_without_results_from_images(scene: Scene) -> None:
+    scene.result(scene.send(scene.pixel_goal()))
+    scene.diagnostic(lambda s: s.level == DiagnosticStatus.OK)
+    scene.head_node.silent.add("images")
+    scene.diagnostic(lambda s: s.level == DiagnosticStatus.WARN and "no results from the images arrive" in s.message)
+    assert not scene.states[-1].verged
+    scene.head_node.silent.clear()
+    scene.diagnostic(lambda s: s.level == DiagnosticStatus.OK)
+
+
+def test_on_unusable_images_the_eyes_are_not_verged_and_the_cause_is_named(scene: Scene) -> None:
+    assert scene.result(scene.send(scene.pixel_goal())).result == LookAt.Result.VERGED
+    scene.head_node.images_fault = "the left image is frozen"
+    scene.until(lambda: not scene.states[-1].verged, "the eyes are no longer verged")
+    begin = len(scene.states)
+    scene.diagnostic(lambda s: s.level == DiagnosticStatus.ERROR and "the left image is frozen" in s.message)
+    assert "the left image is frozen" in scene.states[-1].reason
+    result = scene.result(scene.send(scene.pixel_goal()))
+    assert (result.result, result.reason) == (LookAt.Result.NO_IMAGES, "the left image is frozen")
+    assert not any(state.verged for state in scene.states[begin:])
+    scene.head_node.images_fault = ""
+    assert scene.result(scene.send(scene.pixel_goal())).result == LookAt.Result.VERGED

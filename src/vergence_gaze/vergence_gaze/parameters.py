@@ -38,6 +38,14 @@ class ControlParameters(Parameters):
         minimum=0.1,
         maximum=600,
     )
+    no_feedback_s: float = parameter(
+        2.0,
+        "time without usable joint_states, or with a joint that does not follow its commands, after which a goal fails "
+        "with NO_FEEDBACK",
+        unit="s",
+        minimum=0.1,
+        maximum=600,
+    )
     limits_after_s: float = parameter(
         0.5,
         "time for which the target needs angles beyond the joints' limits after which a goal fails with LIMITS",

@@ -28,8 +28,11 @@ def test_each_eye_is_read_at_its_own_stamp(left_ns: int, right_ns: int) -> None:
     assert eyes.pan_right_rad == pytest.approx(-2.0 * right_ns * 1e-9, abs=1e-12)
 
 
-def test_without_joint_states_the_eyes_look_straight_ahead() -> None:
-    assert JointHistory().at(5, 6) == EyeAngles(0.0, 0.0, 0.0)
+def test_without_joint_states_nothing_is_assumed() -> None:
+    assert JointHistory().at(5, 6) is None
+    assert "no usable joint_states" in JointHistory().gap(5)
+    assert turning().gap(350 * MS) == "no joint_states at the image's stamp: the newest is 0.25 s older"
+    assert turning().gap(-500 * MS) == "joint_states begin 0.50 s after the image"
 
 
 def test_shortly_after_the_newest_sample_it_is_held_and_long_after_nothing_is_known() -> None:

@@ -78,17 +78,23 @@ class JointHistory:
     def at(self, left_stamp: float, right_stamp: float) -> EyeAngles | None:
         """Return the left pan and the tilt at the left image's stamp and the right pan at the right one's.
 
-        None for a stamp that is not covered. Without any joint state the eyes are assumed to look straight ahead, so
-        that images alone can be measured.
+        None for a stamp that is not covered; `gap` says why.
         """
         kept = self._kept
         stamps, _ = kept
-        if not stamps:
-            return EyeAngles(0.0, 0.0, 0.0)
-        if not all(stamps[0] <= stamp <= stamps[-1] + self._hold for stamp in (left_stamp, right_stamp)):
+        if not stamps or not all(stamps[0] <= stamp <= stamps[-1] + self._hold for stamp in (left_stamp, right_stamp)):
             return None
         left, right = (_at(*_bracket(kept, stamp), stamp) for stamp in (left_stamp, right_stamp))
         return EyeAngles(float(left[0]), float(right[1]), float(left[2]))
+
+    def gap(self, stamp: float, units_per_s: float = 1e9) -> str:
+        """Return why the angles at a stamp are not known, in units of which a second has `units_per_s`."""
+        stamps, _ = self._kept
+        if not stamps:
+            return "the joint angles are not known: no usable joint_states have arrived"
+        if stamp < stamps[0]:
+            return f"joint_states begin {(stamps[0] - stamp) / units_per_s:.2f} s after the image"
+        return f"no joint_states at the image's stamp: the newest is {(stamp - stamps[-1]) / units_per_s:.2f} s older"
 
     def samples_between(self, begin: float, end: float) -> list[tuple[float, EyeAngles]]:
         """Return the states after `begin` and before `end`, with their stamps, in order."""

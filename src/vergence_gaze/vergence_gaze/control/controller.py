@@ -16,6 +16,7 @@ from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
 from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, resolve_goal
+from vergence_gaze.joints.feedback import FeedbackMonitor
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.limits import CommandLimits
 from vergence_gaze.joints.resolution import pulse_steps_rad, rig_with_steps
@@ -50,6 +51,7 @@ class GazeController:
         self._command_s = math.nan
         self._send_until_s = -math.inf
         self._beyond_limits = False
+        self._feedback = FeedbackMonitor()
         self._perception = Perception(rig, parameters, _driven(parameters))
         self._configure(parameters)
         self._active = self._verges_on_sight = parameters.control.start == "verge"
@@ -101,12 +103,13 @@ class GazeController:
         try:
             if not self._enabled:
                 raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
-            request = resolve_goal(goal, self._rig, self._p, self._perception.history, now_s)
+            request = resolve_goal(goal, self._rig, self._p, self._perception.history, now_s, self._feedback.fault)
         except GoalError as error:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
         self._goals.end(Result.PREEMPTED, "preempted by a newer goal", now_s)
         self._goals.start(goal_id, goal, now_s, self._p)
+        self._feedback.retry()
         self._active, self._pose, self._verges_on_sight = True, None, False
         self._perception.judge.restart()
         self._law.reset()
@@ -154,20 +157,27 @@ class GazeController:
             self._perception.tracking.clear()
             self._requests.free()
 
-    def step(self, now_s: float, observations: Iterable[Observation] = ()) -> Command:
+    def step(self, now_s: float, observations: Iterable[Observation] = (), joint_fault: str = "") -> Command:
         """Update by what arrived since the last cycle and return what to command now.
 
+        `joint_fault` says why no usable joint_states arrive, as whoever reads them reports it; empty while they do.
         If the clock runs back by more than a second, the eyes hold still and everything starts again.
         """
         if now_s < self._command_s - _CLOCK_JUMP_S:
             self._perception.on_clock_reset()
+            self._feedback.clear()
             self._command_s = now_s
             self._restart("the clock was set back", self._p, now_s)
         for observation in observations:
             self._observe(observation, now_s)
-        if not self._perception.history.known or not math.isfinite(now_s):
-            return Command(None, self._report(now_s), self._goals.pop_outcomes())
         sending = self._enabled and (self._active or now_s < self._send_until_s)
+        last_sent, history = (self._command if sending else None), self._perception.history
+        if not math.isfinite(now_s):
+            return Command(None, self._report(now_s), self._goals.pop_outcomes())
+        fault = self._feedback.update(now_s, history, last_sent, self._driven, joint_fault)
+        self._goals.update_feedback(fault, now_s, self._p)
+        if not history.known:
+            return Command(None, self._report(now_s), self._goals.pop_outcomes())
         if self._command is None or not sending:
             # While idle, others may move the joints: start from where they are.
             self._command, self._command_s = self._limits.nearest(self._perception.history.reported_rad), now_s
@@ -179,7 +189,8 @@ class GazeController:
         self._command, self._command_s = sent, max(now_s, self._command_s)
         if sending:
             self._perception.history.on_command(now_s)
-        self._update_goal(now_s)
+        if not fault:
+            self._update_goal(now_s)
         joints_rad = sent if sending else None
         return Command(joints_rad, self._report(now_s), self._goals.pop_outcomes(), self._requests.pop())
 
@@ -209,9 +220,15 @@ class GazeController:
 
     def _decide(self, now_s: float, command: Array) -> Array:
         """Return the desired joint angles (3,), NaN for joints that stay."""
+        if self._feedback.fault:
+            return self._wait(now_s)
         if self._pose is not None:
             self._phases.enter(Phase.SACCADE, "turning to the requested angles", now_s)
             return self._pose
+        if images_fault := self._perception.images_fault(now_s):
+            self._perception.judge.restart(images_fault)
+            if not self._perception.tracking.follows_stream:
+                return self._wait(now_s)
         unseen = not self._perception.unseen_s(now_s) <= self._p.target.lost_after_s
         if self._verges_on_sight and unseen and self._requests.ask_for_view(self._goals.new_id(), now_s):
             self._phases.enter(Phase.VERGE, "no goal: verging on what the left eye looks at", now_s)
@@ -229,6 +246,19 @@ class GazeController:
         if phase is Phase.SACCADE and self._perception.judge.verged:
             self._perception.judge.restart("a saccade to the target is under way")
         return self._law.compute_command(self._control_input(now_s, command))
+
+    def _fault(self, now_s: float) -> str:
+        """Return what is wrong with the joints' feedback, or else with the images; "" if nothing is."""
+        return self._feedback.fault or self._perception.images_fault(now_s)
+
+    def _wait(self, now_s: float) -> Array:
+        """Let the joints stay where they were sent: during a fault nothing is searched, pursued or verged on."""
+        fault = self._fault(now_s)
+        self._searcher.stop()
+        self._law.reset()
+        self._perception.judge.restart(fault)
+        self._phases.enter(Phase.LOST, fault, now_s)
+        return _UNKNOWN
 
     def _control_input(self, now_s: float, command: Array) -> ControlInput:
         return ControlInput(
@@ -289,6 +319,7 @@ class GazeController:
             by_class=self._perception.tracking.class_name is not None,
             pose_reached=pose_reached,
             ambiguity=self._perception.tracking.ambiguity,
+            images_fault=self._perception.images_fault(now_s),
             at_point=point.reached(now_s) if (point := self._perception.tracking.point) else "",
         )
         if self._goals.update(progress, self._p) is Result.VERGED and pose_reached:
@@ -312,7 +343,8 @@ class GazeController:
         self._phases.enter(Phase.IDLE, reason, now_s)
 
     def _report(self, now_s: float) -> GazeReport:
-        return make_report(now_s, self._perception, self._phases, self._law.name, self._p.control.mode, self._rig)
+        law, mode = self._law.name, self._p.control.mode
+        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, self._fault(now_s))
 
 
 def _driven(parameters: GazeParameters) -> npt.NDArray[np.bool_]:

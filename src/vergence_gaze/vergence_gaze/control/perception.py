@@ -45,6 +45,7 @@ class Perception:
         self._rig, self._described_steps_rad = rig, pulse_steps_rad(rig)
         self.history = ShaftHistory(rig)
         self.image_s = -math.inf
+        self._images_fault, self._images_fault_s = "", -math.inf
         self.pair_s = self.exposure_s = math.nan
         self.contrast: ContrastSample | None = None
         self._predicted_error, self._predicted_s = _NO_PREDICTION, math.nan
@@ -78,6 +79,7 @@ class Perception:
         """Forget everything that has a stamp: the clock was set back."""
         self.history.clear()
         self.image_s, self.contrast = -math.inf, None
+        self._images_fault, self._images_fault_s = "", -math.inf
 
     def update(self, observation: Observation, now_s: float, law: Law, verging: bool) -> None:
         """Update by one observation; `verging` says whether `verged` may be set now."""
@@ -90,7 +92,11 @@ class Perception:
         if isinstance(observation, EyeRotationObservation):
             self._update_rotation(observation)
             return
+        if isinstance(observation, TrackSighting):
+            self._images_fault, self._images_fault_s = observation.images_fault, now_s
         if not isinstance(observation, PointSighting):
+            if self.images_fault(now_s):
+                return
             self.image_s = now_s
             self.exposure_s = observation.stamp_s
         if isinstance(observation, EdgeContrast):
@@ -129,6 +135,14 @@ class Perception:
             return math.inf
         images_arrive = now_s - self.image_s < self._p.control.no_images_s
         return max(0.0, (self.image_s if images_arrive else now_s) - seen_s)
+
+    def images_fault(self, now_s: float) -> str:
+        """Return why nothing in the images may be used, as the tracker says; "" while they may, or none arrive."""
+        return self._images_fault if now_s - self._images_fault_s <= self._p.control.no_images_s else ""
+
+    def images_missing(self, now_s: float) -> bool:
+        """Return whether no results from images have arrived for so long that goals fail."""
+        return not now_s - self.image_s <= self._p.control.no_images_s
 
     def eyes_still(self, now_s: float, command_rad: Array, at_rest: bool = False) -> bool:
         """Return whether the joints rest where commanded (3,), or turn along with the target unless `at_rest`."""

@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 class GazeReport:
     """Angles are estimated, residuals (version, vergence, tilt) are what is left to turn; NaN where unknown.
 
+    `fault` says what is wrong with the joints' feedback or the images, `images_missing` whether no results of images
+    arrive.
     `fixation_m` (3,) is the midpoint of the gaze rays' closest approach and `miss_distance_m` how far they pass.
     """
 
@@ -40,6 +42,8 @@ class GazeReport:
     target: TargetPosition
     fixation_m: Array
     miss_distance_m: float
+    fault: str = ""
+    images_missing: bool = False
 
 
 @dataclass(frozen=True)
@@ -57,15 +61,26 @@ class Command:
 
 
 def make_report(
-    now_s: float, perception: Perception, phases: PhaseMachine, law: str, mode: str, rig: Rig
+    now_s: float,
+    perception: Perception,
+    phases: PhaseMachine,
+    law: str,
+    mode: str,
+    rig: Rig,
+    fault: str = "",
 ) -> GazeReport:
-    """Return the state at `now_s` under this law and mode."""
+    """Return the state at `now_s` under this law and mode; `fault` is that of the feedback or the images."""
     known = perception.history.known and math.isfinite(now_s)
     joints = perception.history.shaft_rad if known else np.full(3, math.nan)
     estimate = perception.tracking.estimate(now_s) if known else None
     residual = residual_of(estimate, joints)
     fixation, miss = fixation_of_joints(joints, rig.baseline_m)
-    reason = phases.reason if known else "waiting for joint_states: none have arrived"
+    images_missing = perception.images_missing(now_s)
+    reason = phases.reason if known else f"waiting: {fault}"
+    if fault not in reason:
+        reason = f"{reason}; {fault}"
+    if images_missing and not fault and phases.phase in (Phase.LOST, Phase.SEARCH):
+        reason = f"{reason}; no results from the images arrive"
     if phases.phase is Phase.VERGE and not perception.judge.verged:
         reason = f"{reason}; {perception.tracking.note or perception.judge.reason}"
     return GazeReport(
@@ -85,6 +100,8 @@ def make_report(
         target=perception.position(estimate),
         fixation_m=fixation,
         miss_distance_m=miss,
+        fault=fault,
+        images_missing=images_missing,
     )
 
 

@@ -32,7 +32,8 @@ class TrackSighting:
 
     `disparity_rad` is NaN while the right eye does not see it; `usable` is False while locking or lost. While
     `ambiguous`, several distances fit, and the disparity is only the likeliest one's; `candidates` are the disparities
-    [rad] that a requested target may have, each with its weight.
+    [rad] that a requested target may have, each with its weight. `images_fault` says why nothing in the images may be
+    used, "" while they may.
     """
 
     stamp_s: float
@@ -49,6 +50,7 @@ class TrackSighting:
     goal_id: int = 0
     ambiguous: bool = False
     candidates: tuple[tuple[float, float], ...] = ()
+    images_fault: str = ""
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ class Result(enum.IntEnum):
     INVALID = 9
     AT_POINT = 10
     AMBIGUOUS = 11
+    NO_FEEDBACK = 12
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from vergence_gaze.phases import Phase
 class Progress:
     """The state that decides a goal, in one cycle. `pose_reached` is None unless the goal is a pose.
 
-    `at_point` says why an empty point counts as looked at and `ambiguity` which distances fit, each "" while that does
-    not hold; `verged_reason` says why the eyes are verged or not yet, `tracking_note` why the last measurement was
-    rejected.
+    `at_point` says why an empty point counts as looked at, `ambiguity` which distances fit, and `images_fault` why the
+    images may not be used, each "" while that does not hold; `verged_reason` says why the eyes are verged or not yet,
+    `tracking_note` why the last measurement was rejected.
     """
 
     now_s: float
@@ -30,6 +30,7 @@ class Progress:
     pose_reached: bool | None
     at_point: str = ""
     ambiguity: str = ""
+    images_fault: str = ""
 
 
 class GoalMonitor:
@@ -40,7 +41,7 @@ class GoalMonitor:
         self._outcomes: list[Outcome] = []
         self._goal_id: int | None = None
         self._since_s = self._limit_s = math.nan
-        self._limited_since_s = self._ambiguous_since_s = math.nan
+        self._limited_since_s = self._ambiguous_since_s = self._faulty_since_s = math.nan
 
     @property
     def goal_id(self) -> int | None:
@@ -59,7 +60,7 @@ class GoalMonitor:
         """Make a goal the active one."""
         self._goal_id, self._since_s = goal_id, now_s
         self._limit_s = goal.time_limit_s or parameters.control.time_limit_s
-        self._limited_since_s = self._ambiguous_since_s = math.nan
+        self._limited_since_s = self._ambiguous_since_s = self._faulty_since_s = math.nan
 
     def end(self, result: Result, reason: str, now_s: float) -> None:
         """End the active goal, if there is one."""
@@ -71,6 +72,13 @@ class GoalMonitor:
         """Return and remove the outcomes since the last call."""
         outcomes, self._outcomes = tuple(self._outcomes), []
         return outcomes
+
+    def update_feedback(self, fault: str, now_s: float, parameters: GazeParameters) -> None:
+        """End the active goal if the joints' feedback has had a fault for too long; "" while it has none."""
+        self._faulty_since_s = _since(self._faulty_since_s, bool(fault), now_s)
+        late = fault and now_s - self._since_s > self._limit_s
+        if late or now_s - self._faulty_since_s > parameters.control.no_feedback_s:
+            self.end(Result.NO_FEEDBACK, fault, now_s)
 
     def update(self, p: Progress, parameters: GazeParameters) -> Result | None:
         """End the active goal if it is reached or can no longer be; returns the result, None while it goes on."""
@@ -101,7 +109,7 @@ class GoalMonitor:
         if p.now_s - self._ambiguous_since_s > parameters.control.ambiguous_after_s:
             return Result.AMBIGUOUS, p.ambiguity
         if p.now_s - max(p.image_s, self._since_s) > parameters.control.no_images_s:
-            return Result.NO_IMAGES, "no results from the images arrive"
+            return Result.NO_IMAGES, p.images_fault or "no results from the images arrive"
         if p.now_s - self._since_s > self._limit_s:
             if p.ambiguity:
                 return Result.AMBIGUOUS, p.ambiguity

@@ -51,9 +51,12 @@ class ClassRequest:
 
 
 def resolve_goal(
-    goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, now_s: float
+    goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, now_s: float, fault: str = ""
 ) -> RequestedTarget | RequestedPose | ClassRequest:
-    """Return what a goal requests; raises GoalError (INVALID or UNREACHABLE)."""
+    """Return what a goal requests; raises GoalError (INVALID or UNREACHABLE).
+
+    `fault` says why no joint is known, if none is.
+    """
     if not (math.isfinite(goal.time_limit_s) and goal.time_limit_s >= 0):
         raise GoalError(Result.INVALID, f"time_limit_s must be 0 (default) or more [s]: got {goal.time_limit_s!r}")
     if goal.kind is GoalKind.CLASS:
@@ -61,7 +64,7 @@ def resolve_goal(
             raise GoalError(Result.INVALID, "class_name must be one of the detector's classes: got an empty text")
         return ClassRequest(goal.class_name)
     if not history.known:
-        raise GoalError(Result.INVALID, "joint_states must have arrived before a goal: none has")
+        raise GoalError(Result.INVALID, f"joint_states must have arrived before a goal: {fault or 'none has'}")
     if goal.kind in (GoalKind.ANGLES, GoalKind.RELATIVE_ANGLES):
         return _pose(goal, rig, parameters, history)
     stamp_s = goal.stamp_s if math.isfinite(goal.stamp_s) and history.covers(goal.stamp_s) else now_s

@@ -11,7 +11,8 @@ from sensor_msgs.msg import CameraInfo, JointState
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
-from vergence_common.diagnostics import OK, WARN, Diagnostics, Report
+from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
+from vergence_common.joint_states import JointStateInput
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
@@ -67,7 +68,7 @@ class GazeControllerNode(Node):
         self._state = watch.create_publisher(GazeState, "gaze/state")
         self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point")
         self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1))
-        watch.create_subscription(JointState, "joint_states", lambda m: self._add(convert.joint_report(m)))
+        self._joint_input = JointStateInput(self, diagnostics, watch, lambda j: self._add(convert.joint_report(j)))
         # Latched: one message per start of the servos' driver.
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         watch.create_subscription(
@@ -99,7 +100,7 @@ class GazeControllerNode(Node):
     def _on_track(self, message: TargetTrack) -> None:
         if message.contrast_window_px:
             self._add(convert.track_contrast(message))
-        elif not self._reads_edges:
+        elif not self._reads_edges and message.status != TargetTrack.STATUS_UNUSABLE_IMAGES:
             # Another tracker says nothing of contrast: vergence/edge does, and costs both sides more.
             self._reads_edges = True
             self._watch.create_subscription(EdgeVergence, "vergence/edge", self._on_edge)
@@ -136,7 +137,7 @@ class GazeControllerNode(Node):
         now_s = self._now_s()
         self._look_at.forward_cancels(now_s)
         arrived, self._arrived = self._arrived, []
-        command = self._controller.step(now_s, arrived)
+        command = self._controller.step(now_s, arrived, self._joint_input.problem())
         self._newest = command.report
         self._cycles += 1
         self._look_at.on_cycle(command)
@@ -175,12 +176,19 @@ class GazeControllerNode(Node):
 
     def _report(self) -> Report:
         report, encoder = self._newest, self._controller.vergence_offset
-        if report is None or not math.isfinite(report.tilt_rad):
-            return Report(WARN, "waiting for joint_states: none have arrived", {"cycles": self._cycles})
+        if report is None:
+            return Report(WARN, "no control cycle yet")
+        if not math.isfinite(report.tilt_rad):
+            level = ERROR if self._joint_input.reader.received else WARN
+            return Report(level, report.reason, {"cycles": self._cycles})
         values = {"law": report.law, "mode": report.mode, "verged": report.verged, "cycles": self._cycles}
         values |= {"eye_rotations_accepted": encoder.accepted, "eye_rotations_rejected": encoder.rejected}
         if encoder.rejection:
             values["eye_rotation_rejection"] = encoder.rejection
+        if report.fault:
+            return Report(ERROR, report.reason, values)
+        if report.images_missing:
+            return Report(WARN, f"no results from the images arrive: {report.reason}", values)
         return Report(OK, f"{report.phase.name.lower()}: {report.reason}", values)
 
 

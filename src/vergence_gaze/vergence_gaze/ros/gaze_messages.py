@@ -10,6 +10,7 @@ from sensor_msgs.msg import CameraInfo, JointState
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from vergence_common.joint_states import MergedJoints
 from vergence_common.stamps import to_seconds, to_stamp
 from vergence_gaze.control.report import GazeReport
 from vergence_gaze.estimation.observations import (
@@ -35,9 +36,9 @@ BASE_FRAME = "rig_base"
 _RAY_M = 2.0
 
 
-def joint_report(message: JointState) -> JointReport:
-    """Return the positions by name; a message with fewer positions than names gives those there are."""
-    return JointReport(to_seconds(message.header.stamp), dict(zip(message.name, message.position, strict=False)))
+def joint_report(joints: MergedJoints) -> JointReport:
+    """Return the angles of all joints by name."""
+    return JointReport(joints.stamp_ns * 1e-9, dict(zip(JOINT_NAMES, joints.angles_rad, strict=True)))
 
 
 def joint_resolution(message: JointState) -> JointResolution:
@@ -66,6 +67,7 @@ def track_sighting(message: TargetTrack, left_camera: CameraModel) -> TrackSight
         goal_id=message.goal_id,
         ambiguous=message.status == TargetTrack.STATUS_AMBIGUOUS,
         candidates=tuple((math.atan(x) - math.atan(x - px / left_camera.fx_px), weight) for px, weight in candidates),
+        images_fault=message.reason if message.status == TargetTrack.STATUS_UNUSABLE_IMAGES else "",
     )
 
 

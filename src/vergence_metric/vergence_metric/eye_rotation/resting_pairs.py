@@ -28,9 +28,9 @@ def measure_pair(
     """
     if models is None:
         return not_measured(EyeRotationStatus.NO_CAMERA_INFO, "no camera_info for images of this size yet")
-    eyes = joints.at(pair.left_stamp_ns, pair.right_stamp_ns) if joints.known else None
+    eyes = joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
     if eyes is None:
-        return not_measured(EyeRotationStatus.NO_JOINTS, "no joint_states at the images' stamps")
+        return not_measured(EyeRotationStatus.NO_JOINTS, joints.gap(max(pair.left_stamp_ns, pair.right_stamp_ns)))
     stamps = (pair.left_stamp_ns, pair.right_stamp_ns)
     moved = joints_moved(joints, min(stamps), max(stamps), rest)
     if not moved:

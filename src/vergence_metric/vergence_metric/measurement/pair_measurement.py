@@ -95,6 +95,7 @@ class PairMeasurement:
         eyes: EyeAngles | None,
         models: Models | None,
         samples: Iterable[StampedEyeAngles] = (),
+        unknown_joints: str = "no joint_states at the image's stamp",
     ) -> Track:
         """Return the track of the target in a pair measured by `edge`.
 
@@ -104,13 +105,14 @@ class PairMeasurement:
             eyes: joint angles at the images' stamps, None if there are none.
             models: both cameras; None uses those of the rig, if they are for images of this size.
             samples: joint angles since the pair before, in order of their stamps [s].
+            unknown_joints: why `eyes` is None, if it is.
         """
         height, width = edge.left_grey.shape
         models = models or self._rig_models
         if any((model.width_px, model.height_px) != (width, height) for model in models):
             return self._unlocked(f"no calibration for {width}x{height} images")
         if eyes is None:
-            return self._unlocked("no joint_states at the image's stamp")
+            return self._unlocked(unknown_joints)
         if self._tracker is None or models != self._models:
             self._models, self._ids_used = models, self._newest_id
             self._tracker = make_tracker(self._parameters.tracker, self._estimator, *models, self._baseline_m)

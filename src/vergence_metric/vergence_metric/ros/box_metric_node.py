@@ -6,7 +6,7 @@ from typing import Any
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import Image, JointState
+from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
@@ -70,7 +70,7 @@ class BoxMetricNode(MetricNode):
         )
         pairing = self._settings.get(PairingParameters)
         self._stereo = StereoInput(self, settings, pairing, diagnostics, qos, self._on_pair, images=self._images)
-        self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
+        self._joint_input = self._subscribe_joints(diagnostics, qos)
         self.add_on_set_parameters_callback(self._refuse_unknown_classes)
         self._settings.on_change(self._on_settings)
         diagnostics.add("detector", self._report)

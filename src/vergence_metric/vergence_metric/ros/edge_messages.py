@@ -1,6 +1,7 @@
-"""Metric I and the signed disparity as messages."""
+"""Metric I and the signed disparity as messages; of unusable images as well, with NaN for every figure."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from std_msgs.msg import Header
@@ -57,3 +58,45 @@ def error_message(
         message.status = VergenceError.STATUS_NO_CAMERA_INFO
         message.reason = "no camera_info for images of this size yet: angles are NaN"
     return message
+
+
+def unusable_edge_message(windows_px: Sequence[int], header: Header, pair_skew_s: float) -> EdgeVergence:
+    """Return the message of a pair whose images cannot be measured."""
+    count, nan = len(windows_px), [math.nan] * len(windows_px)
+    return EdgeVergence(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        windows_px=list(windows_px),
+        left_to_right_px=nan,
+        right_to_left_px=nan,
+        left_edge_count=[0] * count,
+        right_edge_count=[0] * count,
+        chance_left_to_right_px=nan,
+        chance_right_to_left_px=nan,
+        contrast_left_to_right=nan,
+        contrast_right_to_left=nan,
+        contrast=nan,
+        robust_left_to_right_px=nan,
+        robust_right_to_left_px=nan,
+        status=[EdgeVergence.STATUS_UNUSABLE_IMAGES] * count,
+        align_vertical_px=math.nan,
+        align_roll_rad=math.nan,
+    )
+
+
+def unusable_error_message(estimator: str, reason: str, header: Header, pair_skew_s: float) -> VergenceError:
+    """Return the message of a pair whose images cannot be measured, and why."""
+    nan = math.nan
+    return VergenceError(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        horizontal_px=nan,
+        vertical_px=nan,
+        horizontal_rad=nan,
+        vertical_rad=nan,
+        sigma_px=nan,
+        confidence=0.0,
+        estimator=estimator,
+        status=VergenceError.STATUS_UNUSABLE_IMAGES,
+        reason=reason,
+    )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from time import monotonic_ns
 from typing import Any
 
-from sensor_msgs.msg import Image, JointState
+from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
@@ -22,10 +22,11 @@ from vergence_metric.measurement.pair_measurement import Models, PairMeasurement
 from vergence_metric.measurement.parameters import GROUPS, PairMeasurementParameters, VergedParameters
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
-from vergence_metric.ros.edge_messages import edge_message, error_message
+from vergence_metric.pairs.picture_faults import PictureMonitor
+from vergence_metric.ros.edge_messages import edge_message, error_message, unusable_edge_message, unusable_error_message
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
-from vergence_metric.ros.track_messages import track_message, track_request
+from vergence_metric.ros.track_messages import track_message, track_request, unusable_track_message
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
 from vergence_rig.rig import load_rig
@@ -42,6 +43,7 @@ class EdgeMetricNode(MetricNode):
         stereo = self._settings.get(StereoParameters)
         limit_threads(stereo.threads)
         self._measurement = PairMeasurement(_measurement_parameters(self._settings), load_rig(stereo.rig))
+        self._pictures = PictureMonitor()
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
         self._edge_publisher = self._output(qos, EdgeVergence, "vergence/edge")
@@ -51,10 +53,11 @@ class EdgeMetricNode(MetricNode):
         self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
         pairing = self._settings.get(PairingParameters)
         self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit, images=self._images)
-        self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
+        self._joint_input = self._subscribe_joints(diagnostics, qos)
         self._request_subscription = qos.create_subscription(TrackRequest, "vergence/track_request", self._on_request)
         self._settings.on_change(self._on_settings)
         diagnostics.add("measurement", self._report)
+        diagnostics.add("pictures", self._report_pictures)
         diagnostics.add("outputs", self._report_outputs)
 
     def _on_settings(self, settings: ParameterSet) -> None:
@@ -68,6 +71,11 @@ class EdgeMetricNode(MetricNode):
     def _measure(self, pair: ImagePair) -> None:
         self._measurement.set_parameters(_measurement_parameters(self._settings))
         header, skew_s = pair.left.header, pair.skew_ns * 1e-9
+        with self._times.measure("pictures"):
+            fault = self._pictures.update(pair.left_stamp_ns * 1e-9, pair.left.pixels, pair.right.pixels)
+        if fault is not None and fault.unusable:
+            self._publish_unusable(fault.reason, header, skew_s)
+            return
         models = self._stereo.models_for(pair.left.pixels)
         with self._times.measure("metric"):
             edge = self._measurement.edge(pair.left.pixels, pair.right.pixels)
@@ -82,6 +90,14 @@ class EdgeMetricNode(MetricNode):
                 picture = draw_overlay(pair.left.pixels, edge, disparity)
                 self._overlay_publisher.publish(array_to_image(picture, header))
         self._measurement.update_alignment()
+        self._failure = None
+
+    def _publish_unusable(self, reason: str, header: Header, pair_skew_s: float) -> None:
+        estimator = self._settings.get(DisparityParameters).estimator
+        windows_px = self._settings.get(EdgeParameters).windows_px
+        self._error_publisher.publish(unusable_error_message(estimator, reason, header, pair_skew_s))
+        self._edge_publisher.publish(unusable_edge_message(windows_px, header, pair_skew_s))
+        self._track_publisher.publish(unusable_track_message(reason, header, pair_skew_s))
         self._failure = None
 
     def _publish_fovea(self, edge: EdgeMetricResult, models: Models | None, header: Header, pair_skew_s: float) -> None:
@@ -106,9 +122,16 @@ class EdgeMetricNode(MetricNode):
                 (stamp_ns * 1e-9, angles)
                 for stamp_ns, angles in self._joints.samples_between(now_ns - _JOINT_SAMPLES_NS, now_ns)
             ]
-            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models, samples)
+            why = "" if eyes is not None else self._joints.gap(max(now_ns, pair.right_stamp_ns))
+            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models, samples, why)
         angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
         self._track_publisher.publish(track_message(track, edge, angular, pair.left.header, pair.skew_ns * 1e-9))
+
+    def _report_pictures(self) -> Report:
+        fault = self._pictures.fault
+        if fault is None:
+            return Report(OK, "the pictures are neither frozen, nor the same in both eyes, nor black or white")
+        return Report(ERROR, f"{fault.reason}{'; nothing is measured' if fault.unusable else ''}")
 
     def _report(self) -> Report:
         worked, dropped = self._worker.worked, self._worker.dropped

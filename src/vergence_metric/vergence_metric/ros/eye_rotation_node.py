@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-from sensor_msgs.msg import JointState
-
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
@@ -53,7 +51,7 @@ class EyeRotationNode(MetricNode):
         self._stereo = StereoInput(
             self, root, pairing, diagnostics, qos, self._on_pair, self._selection.is_due, self._images
         )
-        self._joint_subscription = qos.create_subscription(JointState, "joint_states", self._on_joints)
+        self._joint_input = self._subscribe_joints(diagnostics, qos)
         self._settings.on_change(self._on_settings)
         diagnostics.add("encoder", self._report)
         diagnostics.add("outputs", self._report_outputs)

@@ -9,17 +9,17 @@ import cv2
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import JointState
 
 from vergence_common.blas_threads import limit_blas_threads
-from vergence_common.diagnostics import OK, Report
+from vergence_common.diagnostics import OK, Diagnostics, Report
+from vergence_common.joint_states import JointStateInput, MergedJoints
 from vergence_common.local_images import LocalImages
 from vergence_common.qos import STATE_QOS, QosWatch
-from vergence_common.stamps import to_nanoseconds
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.stage_times import StageTimes
 from vergence_metric.ros.stereo_input import StereoInput
 from vergence_rig.joint_history import JointHistory
+from vergence_rig.rig import JOINT_NAMES
 
 _UNHEARD_S = 30.0  # without subscribers, until no images are received
 
@@ -78,8 +78,12 @@ class MetricNode(Node):
             return Report(OK, "nothing is measured: no output has a subscriber", {"subscribers": 0})
         return Report(OK, f"{subscribers} subscribers", {"subscribers": subscribers})
 
-    def _on_joints(self, message: JointState) -> None:
-        self._joints.add(to_nanoseconds(message.header.stamp), message.name, message.position)
+    def _subscribe_joints(self, diagnostics: Diagnostics, qos: QosWatch) -> JointStateInput:
+        """Return the subscription of joint_states, which fills the history."""
+        return JointStateInput(self, diagnostics, qos, self._on_joints)
+
+    def _on_joints(self, merged: MergedJoints) -> None:
+        self._joints.add(merged.stamp_ns, JOINT_NAMES, merged.angles_rad)
 
     def _on_failure(self, error: Exception) -> None:
         if not self.context.ok():

@@ -44,6 +44,28 @@ def track_message(
     )
 
 
+def unusable_track_message(reason: str, header: Header, pair_skew_s: float) -> TargetTrack:
+    """Return the message of a pair whose images cannot be measured, and why; it has no contrast either."""
+    nan = math.nan
+    return TargetTrack(
+        header=header,
+        pair_skew_s=pair_skew_s,
+        left_x_px=nan,
+        left_y_px=nan,
+        right_x_px=nan,
+        right_y_px=nan,
+        disparity_px=nan,
+        disparity_rad=nan,
+        sigma_px=nan,
+        extent_width_px=nan,
+        extent_height_px=nan,
+        confidence=0.0,
+        status=TargetTrack.STATUS_UNUSABLE_IMAGES,
+        reason=reason,
+        contrast=nan,
+    )
+
+
 def track_request(message: TrackRequestMessage) -> TrackRequest:
     """Return the request; its pixel is one of the raw image."""
     sized = message.width_px > 0.0 and message.height_px > 0.0

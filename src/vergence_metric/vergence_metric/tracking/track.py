@@ -18,6 +18,7 @@ class TrackStatus(IntEnum):
     OCCLUDED = 3
     UNLOCKED = 4
     AMBIGUOUS = 5
+    UNUSABLE_IMAGES = 6
 
 
 @dataclass(frozen=True)
