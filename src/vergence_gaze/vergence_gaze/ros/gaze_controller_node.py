@@ -190,7 +190,7 @@ def _parameters(settings: ParameterSet) -> GazeParameters:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return run_node(GazeControllerNode, args)
+    return run_node(GazeControllerNode, args, gaze_groups())
 
 
 if __name__ == "__main__":

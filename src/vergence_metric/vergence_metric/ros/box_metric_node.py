@@ -153,4 +153,4 @@ def _parameters_of(settings: ParameterSet) -> BoxMetricParameters:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; see `vergence_common.node_main`."""
-    return run_node(BoxMetricNode, args)
+    return run_node(BoxMetricNode, args, GROUPS)

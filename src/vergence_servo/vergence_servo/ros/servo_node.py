@@ -237,7 +237,7 @@ class ServoNode(Node):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return run_node(ServoNode, args)
+    return run_node(ServoNode, args, parameter_groups())
 
 
 if __name__ == "__main__":
