@@ -11,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 import yaml
 
 from vergence_rig.atomic_file import write_atomically
+from vergence_rig.camera_limits import CameraModelError, check_camera
 
 DISTORTION_LENGTHS = {"plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14), "equidistant": (4,)}
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -52,6 +53,17 @@ class Calibration:
             raise CameraCalibrationError(
                 f"distortion_coefficients must be {allowed} finite numbers: got {list(self.d)}"
             )
+
+        try:
+            check_camera(
+                self.width_px,
+                self.height_px,
+                (self.k[0], self.k[4], self.k[2], self.k[5]),
+                self.d,
+                self.distortion_model,
+            )
+        except CameraModelError as error:
+            raise CameraCalibrationError(f"{self.name}: {error}") from error
 
     def _monocular_projection(self) -> tuple[float, ...]:
         k = self.k

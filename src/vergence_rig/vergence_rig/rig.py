@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import yaml
 
+from vergence_rig.camera_limits import CameraLimitError, check_camera
 from vergence_rig.parameters import ParameterError, Parameters, parameter
 from vergence_rig.servo import MG995, PRESETS, SG90, ServoSpec
 
@@ -42,6 +43,18 @@ class CameraSpec(Parameters):
         """See Parameters."""
         if len(self.distortion) != 5:
             raise ParameterError("distortion", self.distortion, "a list of five numbers: k1 k2 p1 p2 k3")
+        try:
+            check_camera(
+                self.width_px,
+                self.height_px,
+                (self.fx_px, self.fy_px, self.cx_px, self.cy_px),
+                self.distortion,
+                "plumb_bob",
+            )
+        except CameraLimitError as error:
+            name = error.name if error.name == "distortion" else f"{error.name}_px"
+            allowed = error.allowed.removeprefix("be ")
+            raise ParameterError(name, getattr(self, name), allowed) from error
 
 
 @dataclass(frozen=True)

@@ -124,8 +124,11 @@ class GazeControllerNode(Node):
         self._described[left] = described
         try:
             model = convert.camera_model(message)
-        except CameraModelError:
-            return  # not calibrated: the rig's description stays
+        except CameraModelError as error:
+            if any(message.k):  # without them it is not calibrated: the rig's description stays
+                eye = "left" if left else "right"
+                self.get_logger().warning(f"{eye}/camera_info is refused, rig.yaml's description is used: {error}")
+            return
         if left:
             self._left = model
         else:
