@@ -76,6 +76,15 @@ def test_arguments_of_ros_that_cannot_be(arguments: list[str], text: str, domain
     assert text in line
 
 
+@pytest.mark.parametrize("option", ["--params-file", "rig", "servos", "pose_file"])
+def test_a_pipe_instead_of_a_file(option: str, domain_id: int, tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    given = [option, str(pipe)] if option.startswith("--") else ["-p", f"{option}:={pipe}"]
+    result = _run([str(find_node("servo_node")), "--ros-args", "-p", "backend:=fake", *given], {})
+    assert "must be" in _only_line(result, "servo_node: ")
+
+
 @pytest.mark.parametrize("executable", sorted({*NODES, *HOSTS}))
 def test_arguments_that_nothing_reads_and_help(executable: str, domain_id: int) -> None:
     path = str(find_node(executable))

@@ -12,6 +12,7 @@ import yaml
 
 from vergence_rig.atomic_file import write_atomically
 from vergence_rig.camera_limits import CameraModelError, check_camera
+from vergence_rig.yaml_file import YamlFileError, read_yaml
 
 DISTORTION_LENGTHS = {"plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14), "equidistant": (4,)}
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -73,9 +74,9 @@ class Calibration:
 def load_calibration(path: Path) -> Calibration:
     """Return the calibration in a YAML file; raise CameraCalibrationError if it is not one."""
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise CameraCalibrationError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
+        document = read_yaml(path)
+    except YamlFileError as error:
+        raise CameraCalibrationError(f"{path}: {error}") from None
     try:
         return _from_document(document)
     except CameraCalibrationError as error:

@@ -6,6 +6,7 @@ import pwd
 import re
 import tempfile
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
 from vergence_common.arguments import remaps
+from vergence_rig.yaml_file import YamlFileError, read_yaml
 
 LARGEST_DOMAIN_ID = 232
 """RTPS computes port numbers from the domain: those of a higher one do not exist."""
@@ -47,6 +49,7 @@ def init(arguments: Sequence[str] | None = None, **options: Any) -> None:
     _ensure_home()
     _check_log_folder()
     _check_names(arguments or ())
+    _check_parameter_files(arguments or ())
     try:
         rclpy.init(args=list(arguments) if arguments is not None else None, **options)
     except REFUSALS as error:
@@ -108,6 +111,16 @@ def _check_log_folder() -> None:
     if reason:
         text = f"{name} must be a folder in which logs can be written: got {os.environ[name]!r} ({folder}: {reason})"
         raise StartError(text + ("" if name == "ROS_LOG_DIR" else "; ROS_LOG_DIR may name another"))
+
+
+def _check_parameter_files(arguments: Sequence[str]) -> None:
+    # rcl waits for a pipe, and answers faults with two lines or not at all.
+    for option, path in pairwise(arguments):
+        if option == "--params-file":
+            try:
+                read_yaml(path)
+            except YamlFileError as error:
+                raise StartError(f"parameter file '{path}' {error}") from error
 
 
 def _check_names(arguments: Sequence[str]) -> None:
