@@ -18,12 +18,12 @@ from vergence_rig.servo import IDEAL, SG90, ServoSpec
 CONTROL_TICKS = 6
 
 
-def observed(estimator: PlayEstimator, true_half_play: float, reported: list[float]) -> None:
+def observed(estimator: PlayEstimator, true_half_play: float, reported: list[float], every_s: float = 0.2) -> None:
     """Let a joint with this play pass through reported angles before a target at rest."""
     shaft = reported[0]
-    for angle in reported:
+    for i, angle in enumerate(reported):
         shaft = min(max(shaft, angle - true_half_play), angle + true_half_play)
-        estimator.observe(np.full(3, angle), np.full(3, -shaft))
+        estimator.observe(every_s * i, np.full(3, angle), np.full(3, -shaft))
 
 
 @given(st.floats(0.0, 0.02), st.floats(0.0, 0.02))
@@ -47,10 +47,16 @@ def test_a_move_that_the_image_does_not_show_lies_in_the_play() -> None:
 
 def test_a_joint_that_was_not_seen_keeps_its_play() -> None:
     estimator = PlayEstimator(np.full(3, 0.01), 0.7)
-    for angle in (0.0, 0.1, 0.0):
-        estimator.observe(np.full(3, angle), np.array([-angle, math.nan, -angle]))
+    for i, angle in enumerate((0.0, 0.1, 0.0)):
+        estimator.observe(0.2 * i, np.full(3, angle), np.array([-angle, math.nan, -angle]))
     assert estimator.half_play_rad[1] == 0.01
     assert estimator.half_play_rad[0] < 0.01
+
+
+def test_nothing_is_learnt_from_sights_that_are_far_apart() -> None:
+    estimator = PlayEstimator(np.full(3, 0.01), 0.7)
+    observed(estimator, 0.0, [0.0, 0.1, 0.0, 0.1], every_s=2.0)  # meanwhile the target may have moved
+    np.testing.assert_array_equal(estimator.half_play_rad, 0.01)
 
 
 def test_nothing_is_learnt_across_two_targets() -> None:

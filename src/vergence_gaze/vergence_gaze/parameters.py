@@ -38,6 +38,27 @@ class ControlParameters(Parameters):
         minimum=0.1,
         maximum=600,
     )
+    limits_after_s: float = parameter(
+        0.5,
+        "time for which the target needs angles beyond the joints' limits after which a goal fails with LIMITS",
+        unit="s",
+        minimum=0,
+        maximum=600,
+    )
+    ambiguous_after_s: float = parameter(
+        3.0,
+        "time for which several distances or places fit the target after which a goal fails with AMBIGUOUS",
+        unit="s",
+        minimum=0.1,
+        maximum=600,
+    )
+    search_limit_s: float = parameter(
+        2.5,
+        "time of searching for a target that was requested by its place after which a goal fails with LOST",
+        unit="s",
+        minimum=0.1,
+        maximum=600,
+    )
 
 
 @dataclass(frozen=True)

@@ -208,10 +208,9 @@ class TargetTracking(TargetEstimator):
     def _observe_play(self, stamp_s: float, skew_s: float) -> None:
         """Learn the joints' play from a target at rest that eyes at rest have just seen."""
         first, last = sorted((stamp_s, stamp_s + skew_s))
-        if self.filter.moving:
-            self._history.play.restart()
-        elif self.visual is not None and not self._history.speed_within(first - _RESTED_S, last) > 0.0:
-            self._history.play.observe(self._history.reported_at(stamp_s), self.visual.error_rad)
+        if self.filter.moving or self.visual is None or self._history.speed_within(first - _RESTED_S, last) > 0.0:
+            return
+        self._history.play.observe(stamp_s, self._history.reported_at(stamp_s), self.visual.error_rad)
 
 
 __all__ = ["SightingError", "TargetTracking"]

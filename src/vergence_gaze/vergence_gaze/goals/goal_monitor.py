@@ -8,10 +8,6 @@ from vergence_gaze.goals.goal import Goal, Outcome, Result
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.phases import Phase
 
-_LIMITED_S = 0.5
-_LOST_S = 2.5
-_AMBIGUOUS_S = 3.0
-
 
 @dataclass(frozen=True)
 class Progress:
@@ -100,9 +96,9 @@ class GoalMonitor:
             return Result.VERGED, p.verged_reason
         if p.at_point:
             return Result.AT_POINT, p.at_point
-        if p.now_s - self._limited_since_s > _LIMITED_S:
+        if p.now_s - self._limited_since_s > parameters.control.limits_after_s:
             return Result.LIMITS, "the target is beyond the joints' limits"
-        if p.now_s - self._ambiguous_since_s > _AMBIGUOUS_S:
+        if p.now_s - self._ambiguous_since_s > parameters.control.ambiguous_after_s:
             return Result.AMBIGUOUS, p.ambiguity
         if p.now_s - max(p.image_s, self._since_s) > parameters.control.no_images_s:
             return Result.NO_IMAGES, "no results from the images arrive"
@@ -111,7 +107,7 @@ class GoalMonitor:
                 return Result.AMBIGUOUS, p.ambiguity
             lost = p.phase in (Phase.LOST, Phase.SEARCH)
             return (Result.LOST if lost else Result.TIMED_OUT), p.tracking_note or p.verged_reason
-        if p.phase is Phase.SEARCH and not p.by_class and p.in_phase_s > _LOST_S:
+        if p.phase is Phase.SEARCH and not p.by_class and p.in_phase_s > parameters.control.search_limit_s:
             return Result.LOST, "the target was not found again"
         return None
 

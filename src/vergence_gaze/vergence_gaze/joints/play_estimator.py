@@ -11,6 +11,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 _SMALLEST_MOVE_RAD = 1e-4
+_LONGEST_GAP_S = 1.0  # between two sights of the target that are compared
 _UNMOVED_RAD = 0.002  # an image that moves by less stands still, within its noise
 _MOST_TIMES, _LEAST_LIMIT_RAD = 3.0, 0.02  # more than this many times as described, or than this, is no play
 
@@ -31,21 +32,22 @@ class PlayEstimator:
 
     def restart(self) -> None:
         """Drop the last observation: the next one is of another target."""
-        self._before: tuple[Array, Array] | None = None
+        self._before: tuple[float, Array, Array] | None = None
 
-    def observe(self, reported_rad: Array, error_rad: Array) -> None:
+    def observe(self, stamp_s: float, reported_rad: Array, error_rad: Array) -> None:
         """Update by the same resting target, seen with resting eyes once more.
 
         Args:
+            stamp_s: of the exposure; what was seen too long before may be of a target that has moved since.
             reported_rad: the joints as reported at the exposure (3,).
             error_rad: by how much each joint's axis was off the target in the image (3,), NaN where it was not seen.
         """
-        if self._before is not None:
-            moves = reported_rad - self._before[0]
-            seen = self._before[1] - error_rad
+        if self._before is not None and stamp_s - self._before[0] < _LONGEST_GAP_S:
+            moves = reported_rad - self._before[1]
+            seen = self._before[2] - error_rad
             for i in np.flatnonzero(np.isfinite(seen) & (np.abs(moves) > _SMALLEST_MOVE_RAD)):
                 self._observe_move(int(i), float(moves[i]), float(seen[i]))
-        self._before = reported_rad.copy(), error_rad.copy()
+        self._before = stamp_s, reported_rad.copy(), error_rad.copy()
 
     def _observe_move(self, i: int, move_rad: float, seen_rad: float) -> None:
         direction = 1.0 if move_rad > 0 else -1.0
