@@ -1,6 +1,7 @@
 """servo_node as a real node over a fake sysfs tree: topics and services in, pulse widths out."""
 
 import math
+import os
 import subprocess
 import sys
 import time
@@ -168,6 +169,19 @@ def test_joint_command_by_name_reaches_the_pulses_and_joint_states(make_graph: C
     assert graph.duty_us(1) == 0.0
     graph.until(lambda: bool(graph.states) and graph.states[-1].position[0] == pytest.approx(0.3, abs=1e-3))
     assert graph.states[-1].name == JOINTS
+
+
+def test_a_second_node_on_the_same_channels_is_refused_and_the_first_goes_on(
+    make_graph: Callable[..., Graph], tmp_path: Path
+):
+    graph = make_graph()
+    graph.drive(pan_left=0.3)
+    given = {"backend": "kernel_pwm", "kernel_pwm.root": str(tmp_path), "guardian": False, "joints": ["pan_left"]}
+    given["servos"], given["park_rad"] = str(CONFIG / "servos.yaml"), [0.0]
+    overrides = [Parameter(name, value=value) for name, value in given.items()]
+    with pytest.raises(DriverUnavailableError, match=rf"channel 0 of .* must have one owner: .* {os.getpid()} "):
+        ServoNode(context=graph.context, parameter_overrides=overrides)
+    graph.drive(pan_left=-0.3)
 
 
 def test_commands_in_the_order_of_the_joints(make_graph: Callable[..., Graph]):

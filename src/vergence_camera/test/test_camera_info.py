@@ -55,9 +55,9 @@ def test_reads_what_the_ros_calibrators_write(tmp_path: Path) -> None:
 
 @settings(deadline=None, max_examples=40)
 @given(
-    st.lists(st.floats(-10, 10), min_size=5, max_size=5),
-    st.floats(1.0, 5000.0),
-    st.integers(1, 8000),
+    st.lists(st.floats(-0.02, 0.02, allow_subnormal=False), min_size=5, max_size=5),
+    st.floats(500.0, 5000.0),
+    st.integers(500, 5000),
     st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Zl", "Zp")), min_size=1, max_size=12),
 )
 def test_there_and_back(
@@ -68,6 +68,13 @@ def test_there_and_back(
     save_calibration(calibration, path)
     assert load_calibration(path) == calibration
     assert [file.name for file in path.parent.iterdir()] == ["b.yaml"]
+
+
+@pytest.mark.parametrize("changed", [{"k": (1.0, *K[1:])}, {"d": (1e308, *D[1:])}, {"d": (*D[:4], 1e-310)}])
+def test_numbers_that_no_lens_has_are_refused_by_the_cameras_name(changed: dict[str, tuple[float, ...]]) -> None:
+    values = {"k": K, "d": D} | changed
+    with pytest.raises(CameraCalibrationError, match=r"left_webcam: (fx|distortion) must be"):
+        Calibration(640, 480, values["k"], values["d"], name="left_webcam")
 
 
 def test_a_monocular_projection_is_filled_in() -> None:

@@ -11,6 +11,8 @@ from urllib.parse import unquote, urlsplit
 import yaml
 
 from vergence_rig.atomic_file import write_atomically
+from vergence_rig.camera_limits import CameraModelError, check_camera
+from vergence_rig.yaml_file import YamlFileError, read_yaml
 
 DISTORTION_LENGTHS = {"plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14), "equidistant": (4,)}
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -53,6 +55,17 @@ class Calibration:
                 f"distortion_coefficients must be {allowed} finite numbers: got {list(self.d)}"
             )
 
+        try:
+            check_camera(
+                self.width_px,
+                self.height_px,
+                (self.k[0], self.k[4], self.k[2], self.k[5]),
+                self.d,
+                self.distortion_model,
+            )
+        except CameraModelError as error:
+            raise CameraCalibrationError(f"{self.name}: {error}") from error
+
     def _monocular_projection(self) -> tuple[float, ...]:
         k = self.k
         return (*k[0:3], 0.0, *k[3:6], 0.0, *k[6:9], 0.0)
@@ -61,9 +74,9 @@ class Calibration:
 def load_calibration(path: Path) -> Calibration:
     """Return the calibration in a YAML file; raise CameraCalibrationError if it is not one."""
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise CameraCalibrationError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
+        document = read_yaml(path)
+    except YamlFileError as error:
+        raise CameraCalibrationError(f"{path}: {error}") from None
     try:
         return _from_document(document)
     except CameraCalibrationError as error:

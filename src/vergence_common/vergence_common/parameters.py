@@ -29,6 +29,7 @@ class ParameterSet:
 
     def __init__(self, groups: dict[str, Parameters]) -> None:
         self._groups = groups
+        self._checks: list[Callable[[ParameterSet], None]] = []
         self._listeners: list[Callable[[ParameterSet], None]] = []
 
     @property
@@ -40,6 +41,13 @@ class ParameterSet:
         """Return the current group of class `kind`."""
         return next(group for group in self._groups.values() if type(group) is kind)
 
+    def add_check(self, check: Callable[["ParameterSet"], None]) -> None:
+        """Call `check` with the set as it would be, types and ranges checked, before each change.
+
+        It raises ParameterError, with the parameter's full name, for what only the node can judge.
+        """
+        self._checks.append(check)
+
     def on_change(self, listener: Callable[["ParameterSet"], None]) -> None:
         """Call `listener` with this set after every applied change."""
         self._listeners.append(listener)
@@ -50,6 +58,27 @@ class ParameterSet:
             own = {spec.name: changes[prefix + spec.name] for spec in group.specs() if prefix + spec.name in changes}
             fresh[prefix] = _named(prefix, partial(group.replaced, **own)) if own else group
         return fresh
+
+    def _writable(self) -> dict[str, ParameterSpec]:
+        return {
+            prefix + spec.name: spec
+            for prefix, group in self._groups.items()
+            for spec in group.specs()
+            if not spec.read_only
+        }
+
+    def _refusal(self, changes: dict[str, Any]) -> str:
+        """Return why these changes cannot be made, "" if they can."""
+        names = ", ".join(f"'{name}'" for name in changes)
+        try:
+            candidate = ParameterSet(self._candidate(changes))
+            for check in self._checks:
+                check(candidate)
+        except ParameterError as error:
+            return str(error)
+        except Exception as error:  # a check that fails must not end the node
+            return f"parameter {names} cannot be used: {type(error).__name__}: {error}"
+        return ""
 
     def _apply(self, changes: dict[str, Any]) -> None:
         fresh = self._candidate(changes)
@@ -109,18 +138,41 @@ def declare(node: Node, groups: Groups, allow_prefixes: tuple[str, ...] = ()) ->
     parameter_set = ParameterSet(values)
 
     def refuse(changes: list[Parameter]) -> SetParametersResult:
-        try:
-            parameter_set._candidate({change.name: change.value for change in changes})
-        except ParameterError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+        reason = parameter_set._refusal({change.name: change.value for change in changes})
+        return SetParametersResult(successful=not reason, reason=reason)
 
     def apply(changes: list[Parameter]) -> None:
         parameter_set._apply({change.name: change.value for change in changes})
 
     node.add_on_set_parameters_callback(refuse)
+    _refuse_by_name(node, parameter_set)
     node.add_post_set_parameters_callback(apply)
     return parameter_set
+
+
+def _refuse_by_name(node: Node, parameter_set: ParameterSet) -> None:
+    """Check a request before rclpy does: its refusal of a wrong type does not name the parameter.
+
+    A whole number is made a float where one is declared, as at the start.
+    """
+    of_rclpy = node.set_parameters_atomically
+
+    def set_parameters_atomically(changes: list[Parameter]) -> SetParametersResult:
+        writable = parameter_set._writable()
+        reason = parameter_set._refusal({c.name: c.value for c in changes if c.name in writable})
+        if reason:
+            return SetParametersResult(successful=False, reason=reason)
+        result = of_rclpy([_typed(change, writable.get(change.name)) for change in changes])
+        if not result.successful and not any(change.name in result.reason for change in changes):
+            names = ", ".join(f"'{change.name}'" for change in changes)
+            result.reason = f"parameter {names} is not changed: {result.reason}"
+        return result
+
+    node.set_parameters_atomically = set_parameters_atomically
+
+
+def _typed(change: Parameter, spec: ParameterSpec | None) -> Parameter:
+    return change if spec is None else _to_ros(change.name, spec, spec.normalised(change.value))
 
 
 def _named(prefix: str, build: Callable[[], Any]) -> Any:

@@ -1,7 +1,9 @@
 """The QoS profiles, and a diagnostic that names every incompatible publisher and subscriber."""
 
+import difflib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from copy import copy
 from typing import Any
 
 from rclpy.event_handler import (
@@ -18,14 +20,23 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 
 from vergence_common.diagnostics import OK, WARN, Diagnostics, Report
+from vergence_rig.parameters import UnknownParameterError
 
 IMAGE_QOS = QoSProfile(history=QoSHistoryPolicy.KEEP_LAST, depth=2, reliability=QoSReliabilityPolicy.RELIABLE)
 STATE_QOS = QoSProfile(history=QoSHistoryPolicy.KEEP_LAST, depth=10, reliability=QoSReliabilityPolicy.RELIABLE)
 
+_PREFIX = "qos_overrides."
+
+# The value that every other side is compatible with: what a publisher should offer, what a subscription should request.
+_COMPATIBLE = {
+    QoSPolicyKind.RELIABILITY: {"publisher": "reliable", "subscription": "best_effort"},
+    QoSPolicyKind.DURABILITY: {"publisher": "transient_local", "subscription": "volatile"},
+}
+
 
 def overridable() -> QoSOverridingOptions:
-    """Let users override history, depth and reliability by the `qos_overrides` parameters."""
-    return QoSOverridingOptions.with_default_policies()
+    """Let users override history, depth, reliability and durability by the `qos_overrides` parameters."""
+    return QoSOverridingOptions(policy_kinds=(QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, *_COMPATIBLE))
 
 
 class QosWatch:
@@ -46,12 +57,13 @@ class QosWatch:
         """As Node.create_publisher, overridable and watched; `matched` is called when a subscriber comes or goes."""
 
         def mismatch(event: QoSOfferedIncompatibleQoSInfo) -> None:
-            self._count(topic, "a subscriber requests more than the publisher offers", event.last_policy_kind)
+            what = "a subscriber requests more than the publisher offers"
+            self._count(topic, "publisher", what, event.last_policy_kind)
 
         return self._node.create_publisher(
             message_type,
             topic,
-            qos,
+            copy(qos),  # rclpy writes the overrides into it
             qos_overriding_options=overridable(),
             event_callbacks=PublisherEventCallbacks(incompatible_qos=mismatch, matched=matched),
         )
@@ -62,13 +74,14 @@ class QosWatch:
         """As Node.create_subscription, overridable and watched."""
 
         def mismatch(event: QoSRequestedIncompatibleQoSInfo) -> None:
-            self._count(topic, "a publisher offers less than the subscriber requests", event.last_policy_kind)
+            what = "a publisher offers less than the subscriber requests"
+            self._count(topic, "subscription", what, event.last_policy_kind)
 
         return self._node.create_subscription(
             message_type,
             topic,
             callback,
-            qos,
+            copy(qos),
             qos_overriding_options=overridable(),
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=mismatch),
         )
@@ -79,9 +92,13 @@ class QosWatch:
             return Report(OK, "all QoS profiles are compatible")
         return Report(WARN, "; ".join(self._mismatches), dict(self._mismatches))
 
-    def _count(self, topic: str, what: str, policy: int) -> None:
-        name = QoSPolicyKind(policy).name.lower()
-        text = f"{topic}: {what} ({name}); set qos_overrides.{topic}.*.{name} on one side"
+    def _count(self, topic: str, side: str, what: str, policy: int) -> None:
+        kind = QoSPolicyKind(policy)
+        name, value = kind.name.lower(), _COMPATIBLE.get(kind, {}).get(side)
+        full_topic = self._node.resolve_topic_name(topic)
+        text = f"{topic}: {what} ({name})"
+        if value is not None:
+            text += f"; start this node with -p {_PREFIX}{full_topic}.{side}.{name}:={value}, or change the other side"
         if not self._mismatches[text]:
             self._node.get_logger().warning(text)
         self._mismatches[text] += 1
@@ -90,3 +107,14 @@ class QosWatch:
 def watch_qos(node: Node, diagnostics: Diagnostics) -> QosWatch:
     """Return a QosWatch that reports into `diagnostics`."""
     return QosWatch(node, diagnostics)
+
+
+def check_overrides(nodes: Sequence[Node]) -> None:
+    """Raise ParameterError for a `qos_overrides` parameter that no publisher or subscription of these nodes reads."""
+    known = {name for node in nodes for name in node._parameters if name.startswith(_PREFIX)}
+    for node in nodes:
+        for name, override in node._parameter_overrides.items():
+            if not name.startswith(_PREFIX) or name in known or name.startswith(f"{_PREFIX}/clock."):
+                continue
+            close = difflib.get_close_matches(name, known, n=3) or sorted(known)
+            raise UnknownParameterError(name, override.value, close)

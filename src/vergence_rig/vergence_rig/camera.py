@@ -11,18 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from vergence_rig.camera_limits import CameraModelError, check_camera
+
 if TYPE_CHECKING:
     from vergence_rig.rig import CameraSpec
+
+__all__ = ["CameraModel", "CameraModelError"]
 
 Array = npt.NDArray[np.float64]
 
 _COEFFICIENTS = {"": (0, 4, 5), "plumb_bob": (0, 4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
 _ITERATIONS = 50
 _TOLERANCE = 1e-10
-
-
-class CameraModelError(ValueError):
-    """An invalid camera model: the message names the value, what it must be, and what was given."""
+_BENDS_NO_RAY = 1e-9
 
 
 class CameraModel:
@@ -61,18 +62,17 @@ class CameraModel:
         self.fx_px, self.fy_px, self.cx_px, self.cy_px = (float(value) for value in intrinsics)
         if self.width_px <= 0 or self.height_px <= 0:
             raise CameraModelError(f"image size must be at least 1 x 1 [px]: got {width} x {height}")
-        if not (np.isfinite(intrinsics).all() and self.fx_px > 0 and self.fy_px > 0):
-            raise CameraModelError(f"fx, fy, cx, cy must be finite, fx and fy above 0 [px]: got {tuple(intrinsics)}")
         if distortion_model not in _COEFFICIENTS:
             known = ", ".join(repr(name) for name in _COEFFICIENTS if name)
             raise CameraModelError(f"distortion_model must be one of {known}: got {distortion_model!r}")
         coefficients = np.asarray(d, dtype=np.float64).reshape(-1)
-        if coefficients.size not in _COEFFICIENTS[distortion_model] or not np.isfinite(coefficients).all():
+        if coefficients.size not in _COEFFICIENTS[distortion_model]:
             counts = " or ".join(str(count) for count in _COEFFICIENTS[distortion_model])
             raise CameraModelError(
-                f"distortion must be {counts} finite values for '{distortion_model}': got {coefficients.tolist()}"
+                f"distortion must be {counts} values for '{distortion_model}': got {coefficients.size}"
             )
         self.distortion_model = distortion_model or "plumb_bob"
+        check_camera(self.width_px, self.height_px, intrinsics, coefficients.tolist(), self.distortion_model)
         self.distortion = coefficients
         self._is_distorted = bool(np.any(coefficients)) or self.distortion_model == "equidistant"
         self._limit = _monotone_limit(coefficients) if self.distortion_model == "plumb_bob" else np.inf
@@ -182,6 +182,7 @@ def _monotone_limit(coefficients: Array) -> float:
     if coefficients.size == 0 or not np.any(coefficients):
         return np.inf
     k1, k2, k3 = coefficients[0], coefficients[1], coefficients[4] if coefficients.size > 4 else 0.0
-    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+    # np.roots divides by the leading coefficient: one that bends no ray would overflow.
+    roots = np.roots([value if abs(value) > _BENDS_NO_RAY else 0.0 for value in (7 * k3, 5 * k2, 3 * k1, 1.0)])
     real = roots[np.abs(roots.imag) < 1e-9].real
     return float(np.sqrt(real[real > 0].min())) if np.any(real > 0) else np.inf

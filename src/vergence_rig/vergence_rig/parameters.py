@@ -31,6 +31,20 @@ REQUIRED: Any = _Required()
 """Default of a parameter that has no sensible one: the user must give it."""
 
 
+_LONGEST_SHOWN = 200
+
+
+def shown(value: object) -> str:
+    """Return a value as it stands in an error message: at most some 200 characters of it."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python writes no integer of more than 4300 digits
+        return "a number of more than 4300 digits"
+    except RecursionError:
+        return "a value nested too deeply to show"
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 3]}..."
+
+
 class ParameterError(ValueError):
     """An invalid parameter value: the message names the parameter, what it must be, and the value given.
 
@@ -38,7 +52,7 @@ class ParameterError(ValueError):
     """
 
     def __init__(self, name: str, value: object, allowed: str) -> None:
-        super().__init__(f"parameter '{name}' must be {allowed}: got {value!r}")
+        super().__init__(f"parameter '{name}' must be {allowed}: got {shown(value)}")
         self.name, self.value, self.allowed = name, value, allowed
 
     def prefixed(self, prefix: str) -> "ParameterError":
@@ -121,7 +135,10 @@ class ParameterSpec:
 
     def _normalised_element(self, element: Any, whole: Any) -> Any:
         if self.kind is float and isinstance(element, int) and not isinstance(element, bool):
-            element = float(element)
+            try:
+                element = float(element)
+            except OverflowError:
+                raise ParameterError(self.name, whole, self.allowed) from None
         if type(element) is not self.kind:  # not isinstance: True is no whole number
             raise ParameterError(self.name, whole, self.allowed)
         if isinstance(element, float) and not math.isfinite(element):

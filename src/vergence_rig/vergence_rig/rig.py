@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
-
+from vergence_rig.camera_limits import CameraLimitError, check_camera
 from vergence_rig.parameters import ParameterError, Parameters, parameter
 from vergence_rig.servo import MG995, PRESETS, SG90, ServoSpec
+from vergence_rig.yaml_file import YamlFileError, read_yaml
 
 JOINT_NAMES = ("pan_left", "pan_right", "tilt")
 """The three joints, in the order that commands carry them."""
@@ -42,6 +42,18 @@ class CameraSpec(Parameters):
         """See Parameters."""
         if len(self.distortion) != 5:
             raise ParameterError("distortion", self.distortion, "a list of five numbers: k1 k2 p1 p2 k3")
+        try:
+            check_camera(
+                self.width_px,
+                self.height_px,
+                (self.fx_px, self.fy_px, self.cx_px, self.cy_px),
+                self.distortion,
+                "plumb_bob",
+            )
+        except CameraLimitError as error:
+            name = error.name if error.name == "distortion" else f"{error.name}_px"
+            allowed = error.allowed.removeprefix("be ")
+            raise ParameterError(name, getattr(self, name), allowed) from error
 
 
 @dataclass(frozen=True)
@@ -160,11 +172,9 @@ def load_rig(path: str | Path) -> Rig:
     if str(path) == "":
         return default_rig()
     try:
-        document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RigError(f"rig file '{path}' cannot be read: {error.strerror or error}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise RigError(f"rig file '{path}' is not YAML: {' '.join(str(error).split())}") from error
+        document = read_yaml(path)
+    except YamlFileError as error:
+        raise RigError(f"rig file '{path}' {error}") from error
     try:
         return rig_from_mapping(document)
     except RigError as error:

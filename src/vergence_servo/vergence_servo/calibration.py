@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from vergence_rig.parameters import REQUIRED, ParameterError, Parameters, parameter
 from vergence_rig.rig import JointSpec
 from vergence_rig.servo import MG995, SG90, ServoSpec
+from vergence_rig.yaml_file import YamlFileError, read_yaml
 
 _DEG = math.pi / 180.0
 _PLAUSIBLE_US_PER_RAD = (150.0, 4000.0)
@@ -172,11 +171,9 @@ def load_servos(path: str | Path) -> dict[str, ServoCalibration]:
     if str(path) == "":
         return default_servos()
     try:
-        return servos_from_mapping(yaml.safe_load(Path(path).read_text(encoding="utf-8")))
-    except OSError as error:
-        raise ServoCalibrationError(f"servo file '{path}' cannot be read: {error.strerror or error}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ServoCalibrationError(f"servo file '{path}' is not YAML: {' '.join(str(error).split())}") from error
+        return servos_from_mapping(read_yaml(path))
+    except YamlFileError as error:
+        raise ServoCalibrationError(f"servo file '{path}' {error}") from error
     except ServoCalibrationError as error:
         raise ServoCalibrationError(f"servo file '{path}': {error}") from error
 

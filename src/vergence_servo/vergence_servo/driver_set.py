@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
+from types import MappingProxyType
 from typing import Any
 
 from vergence_servo.calibration import ServoCalibration, ServoCalibrationError, check_channels
 from vergence_servo.drivers.protocol import Backend, DriverUnavailableError, ServoDriver
 from vergence_servo.drivers.registry import find_backend, open_driver
+from vergence_servo.hardware_lock import HardwareLocks
 
 
 def backends_of(servos: Mapping[str, ServoCalibration], joints: Iterable[str], default: str) -> dict[str, str]:
@@ -35,19 +37,36 @@ def backends_of(servos: Mapping[str, ServoCalibration], joints: Iterable[str], d
 class DriverSet:
     """One open driver of each backend; `backends` is the backend of each joint."""
 
-    def __init__(self, backends: Mapping[str, str], values: Callable[[Backend], Mapping[str, Any]]) -> None:
+    def __init__(
+        self,
+        backends: Mapping[str, str],
+        values: Callable[[Backend], Mapping[str, Any]],
+        channels: Mapping[str, int] = MappingProxyType({}),
+    ) -> None:
         """Open every backend once, with the parameters that `values` returns for it.
 
-        Raises DriverUnavailableError or ParameterError where one cannot be opened; the others are closed then.
+        With the joints' `channels`, their hardware is locked first, so that no other process drives it. Raises
+        DriverUnavailableError or ParameterError where one cannot be opened; the others are closed then.
         """
         self.backends = dict(backends)
         self.values = {name: dict(values(find_backend(name))) for name in dict.fromkeys(backends.values())}
         self._drivers: dict[str, ServoDriver] = {}
         with ExitStack() as opened:
+            self.locks = HardwareLocks(self._hardware(channels))
+            opened.callback(self.locks.close)
             for name, given in self.values.items():
                 self._drivers[name] = open_driver(name, given)
                 opened.callback(self._drivers[name].close)
             opened.pop_all()
+
+    def _hardware(self, channels: Mapping[str, int]) -> list[str]:
+        needed: list[str] = []
+        for name, given in self.values.items():
+            entry = find_backend(name)
+            used = [channels[joint] for joint in self.joints(name) if joint in channels]
+            if entry.hardware is not None and used:
+                needed += entry.hardware(entry.parameters.from_mapping(given), used)
+        return needed
 
     @property
     def by_backend(self) -> Mapping[str, ServoDriver]:
@@ -73,3 +92,4 @@ class DriverSet:
         """Release every channel that was used and free the hardware, backend by backend."""
         for driver in self._drivers.values():
             driver.close()
+        self.locks.close()

@@ -24,11 +24,17 @@ _DISMISSAL = b"released\n"
 class Guardian:
     """The guarded process's side. It needs no context manager: the guardian acts when this process ends."""
 
-    def __init__(self, backend: str, values: Mapping[str, Any], channels: Sequence[int]) -> None:
-        """Start the guardian of these channels of a backend with these parameters. Raises OSError."""
+    def __init__(
+        self, backend: str, values: Mapping[str, Any], channels: Sequence[int], locks: Sequence[int] = ()
+    ) -> None:
+        """Start the guardian of these channels of a backend with these parameters. Raises OSError.
+
+        It inherits the open files `locks`: no other process may own the channels before they have been released.
+        """
         self._process = subprocess.Popen(
             [sys.executable, "-m", "vergence_servo.guardian", backend, json.dumps(dict(values)), *map(str, channels)],
             stdin=subprocess.PIPE,
+            pass_fds=locks,
             start_new_session=True,  # a Ctrl-C in the terminal is for the node, not for its guardian
         )
 
@@ -58,7 +64,7 @@ class Guardians:
             for backend, driver in drivers.by_backend.items():
                 if driver.outlives_process:
                     guarded = [channels[joint] for joint in drivers.joints(backend)]
-                    self._running.append(Guardian(backend, drivers.values[backend], guarded))
+                    self._running.append(Guardian(backend, drivers.values[backend], guarded, drivers.locks.descriptors))
         except BaseException:
             self.dismiss()
             raise

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from vergence_rig.atomic_file import write_atomically
+from vergence_rig.yaml_file import read_small_text
 
 
 def default_pose_file() -> Path:
@@ -15,17 +16,22 @@ def default_pose_file() -> Path:
 
 
 def read_pose(path: Path) -> dict[str, float]:
-    """Return the angles [rad] by joint; empty where the file is missing or not valid."""
+    """Return the angles [rad] by joint; empty where the file is missing or not valid, without those beyond half a turn.
+
+    Raises ValueError for a pipe, a folder or another thing that is no file: it could not be replaced by a pose either.
+    """
+    if path.exists() and not path.is_file():
+        raise ValueError(f"parameter 'pose_file' must be the path of a regular file: got '{path}'")
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        document = json.loads(read_small_text(path))
+    except (ValueError, RecursionError):
         return {}
     if not isinstance(document, dict):
         return {}
     return {
         str(name): float(value)
         for name, value in document.items()
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= math.pi
     }
 
 

@@ -66,3 +66,18 @@ def test_set_camera_info_saves_and_publishes(
     assert not answer.success
     assert "640x480" in answer.status_message
     assert load_calibration(ros_home / "camera_info" / "left.yaml") == saved
+
+
+@pytest.mark.parametrize("value", [1e308, 1e-310, 1000.0, -1.0])
+def test_set_camera_info_refuses_numbers_that_no_lens_has(
+    graph: Any, machine: FakeMachine, start: Callable[..., CameraNode], ros_home: Path, value: float
+) -> None:
+    machine.plug_in(0)
+    start()
+    client = graph.client.create_client(SetCameraInfo, "/left/set_camera_info")
+    graph.wait_until(client.service_is_ready, "the service")
+    hostile = CameraInfo(width=640, height=480, k=K, d=[value, 0.0, 0.0, 0.0, 0.0], distortion_model="plumb_bob")
+    answer = graph.wait(client.call_async(SetCameraInfo.Request(camera_info=hostile)))
+    assert not answer.success
+    assert answer.status_message.startswith("left: distortion must be")
+    assert not list(ros_home.rglob("*.yaml"))

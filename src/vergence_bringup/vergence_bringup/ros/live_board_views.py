@@ -18,6 +18,7 @@ from vergence_camera.calibration.views import EYES, View, ViewCollector
 from vergence_common.images import ImageError, compressed_to_array, image_to_array
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_seconds
+from vergence_common.start import init
 
 Picture = npt.NDArray[np.uint8]
 
@@ -107,7 +108,7 @@ def collect_live(collector: ViewCollector, args: argparse.Namespace, say: Callab
     """Collect views until there are enough or the user ends it; raises BoardError if there is none."""
     eyes = EYES if args.eyes == "both" else (args.eyes,)
     topics = {eye: topic for eye, topic in zip(EYES, args.topics, strict=True) if eye in eyes}
-    rclpy.init(args=[])
+    init([])
     try:
         node = LiveViews(collector, topics, args.views, args.max_skew_s, say)
         say("move the board through the whole image, near and far, tilted; hold it still for a moment each time")

@@ -22,6 +22,7 @@ from vergence_bringup.commands.look_request import (
     result_line,
 )
 from vergence_bringup.graph_errors import GraphError
+from vergence_common.start import checked_namespace, init
 from vergence_msgs.action import LookAt
 
 __all__ = ["add_arguments", "run"]
@@ -36,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     stop_asked = threading.Event()
     # Without rclpy's handlers, since after Ctrl-C the goal is still to be cancelled; and without an exception in the
     # middle of whatever rclpy does then.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    init(signal_handler_options=SignalHandlerOptions.NO)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop_asked.set())
     look = Look(options.namespace, stop_asked)
@@ -62,7 +63,7 @@ class Look:
 
     def __init__(self, namespace: str, stop_asked: threading.Event) -> None:
         self._stop_asked = stop_asked
-        self._node = Node("vergence_look", namespace=namespace or None)
+        self._node = Node("vergence_look", namespace=checked_namespace(namespace))
         self._client = ActionClient(self._node, LookAt, "gaze/look_at")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)

@@ -22,6 +22,7 @@ from sensor_msgs.msg import CameraInfo, JointState
 from vergence_bringup.figures.watch_screen import Screen, Snapshot, Stream
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_common.stamps import to_seconds
+from vergence_common.start import checked_namespace, init
 from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, VergenceError
 from vergence_rig.rig import load_rig
 
@@ -61,7 +62,7 @@ class GraphMonitor(Node):
     """Keeps the newest message of every topic, its arrival and its rate."""
 
     def __init__(self, namespace: str) -> None:
-        super().__init__("vergence_watch", namespace=namespace or None)
+        super().__init__("vergence_watch", namespace=checked_namespace(namespace))
         self.streams = {topic: Stream() for topic in _TOPICS}
         self.health: dict[str, tuple[int, str, float]] = {}
         for topic, (kind, qos) in _TOPICS.items():
@@ -90,7 +91,7 @@ class GraphMonitor(Node):
 def run(options: argparse.Namespace) -> int:
     """Show the graph until q or Ctrl-C; with --once return 1 if no message arrived."""
     screen = Screen(_limits(options.rig))
-    rclpy.init()
+    init()
     node = GraphMonitor(options.namespace)
     executor = SingleThreadedExecutor()
     executor.add_node(node)

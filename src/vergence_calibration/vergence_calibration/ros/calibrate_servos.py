@@ -87,6 +87,7 @@ def _by_hand(
     drivers = DriverSet(
         backends_of(old, joints, options.backend),
         lambda backend: {key: value for (name, key), value in settings.items() if name == backend.name},
+        {name: old[name].channel for name in joints},
     )
     fresh = {}
     try:

@@ -14,6 +14,7 @@ from sensor_msgs.msg import CameraInfo, JointState
 
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_common.stamps import to_nanoseconds
+from vergence_common.start import checked_namespace, init
 from vergence_rig.camera import CameraModel, CameraModelError
 
 EYES = ("left", "right")
@@ -33,8 +34,8 @@ class RunningHead:
     """
 
     def __init__(self, name: str, namespace: str = "", own_signals: bool = False) -> None:
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO if own_signals else None)
-        self.node = Node(name, namespace=namespace or None)
+        init([], signal_handler_options=SignalHandlerOptions.NO if own_signals else None)
+        self.node = Node(name, namespace=checked_namespace(namespace))
         self.arrival = threading.Condition()
         """Held while received data is changed or read, and notified after every change."""
         self._infos: dict[str, CameraInfo] = {}

@@ -245,4 +245,4 @@ class CameraNode(Node):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; see run_node for the exit status."""
-    return run_node(CameraNode, args)
+    return run_node(CameraNode, args, GROUPS)

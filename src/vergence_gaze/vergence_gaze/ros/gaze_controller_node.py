@@ -125,8 +125,11 @@ class GazeControllerNode(Node):
         self._described[left] = described
         try:
             model = convert.camera_model(message)
-        except CameraModelError:
-            return  # not calibrated: the rig's description stays
+        except CameraModelError as error:
+            if any(message.k):  # without them it is not calibrated: the rig's description stays
+                eye = "left" if left else "right"
+                self.get_logger().warning(f"{eye}/camera_info is refused, rig.yaml's description is used: {error}")
+            return
         if left:
             self._left = model
         else:
@@ -198,7 +201,7 @@ def _parameters(settings: ParameterSet) -> GazeParameters:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return run_node(GazeControllerNode, args)
+    return run_node(GazeControllerNode, args, gaze_groups())
 
 
 if __name__ == "__main__":

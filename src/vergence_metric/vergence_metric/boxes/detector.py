@@ -19,6 +19,7 @@ from vergence_metric.boxes.suppression import suppress
 
 _DEFAULT_SIZE_PX = (640, 640)
 _DEFAULT_THRESHOLD = 0.35
+_MAX_DIGITS = 9
 _FIRST_LOOK_SHARE = 0.5  # of the threshold: score that earns a box a second look
 _LEAST_CROP_SCORE = 0.05
 
@@ -167,7 +168,7 @@ def _class_ids(wanted: tuple[str, ...], names: tuple[str, ...]) -> NDArray[np.in
     for name in wanted:
         if name in names:
             ids.append(names.index(name))
-        elif name.isdigit() and (not names or int(name) < len(names)):
+        elif name.isdecimal() and len(name) <= _MAX_DIGITS and (not names or int(name) < len(names)):
             ids.append(int(name))
         else:
             raise ModelClassError(

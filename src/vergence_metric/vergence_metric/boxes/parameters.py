@@ -53,7 +53,9 @@ class DetectorParameters(Parameters):
         formerly="max_det",
     )
     classes: tuple[str, ...] = parameter(
-        (), "names or numbers of the classes that are detected; empty for all", formerly="classes"
+        (),
+        'names of the classes that are detected, or their numbers as texts, such as "0"; empty for all',
+        formerly="classes",
     )
     input_height_px: int = parameter(
         0,

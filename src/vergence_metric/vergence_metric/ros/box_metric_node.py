@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
@@ -36,6 +34,7 @@ from vergence_metric.ros.box_messages import (
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
 from vergence_msgs.msg import BoxVergence, StereoDetections
+from vergence_rig.parameters import ParameterError
 from vergence_rig.rig import load_rig
 
 EYES = ("left", "right")
@@ -71,18 +70,17 @@ class BoxMetricNode(MetricNode):
         pairing = self._settings.get(PairingParameters)
         self._stereo = StereoInput(self, settings, pairing, diagnostics, qos, self._on_pair, images=self._images)
         self._joint_input = self._subscribe_joints(diagnostics, qos)
-        self.add_on_set_parameters_callback(self._refuse_unknown_classes)
+        self._settings.add_check(self._check_classes)
         self._settings.on_change(self._on_settings)
         diagnostics.add("detector", self._report)
         diagnostics.add("outputs", self._report_outputs)
 
-    def _refuse_unknown_classes(self, changes: list[Parameter]) -> SetParametersResult:
-        wanted = next((tuple(c.value or ()) for c in changes if c.name == "detector.classes"), ())
+    def _check_classes(self, candidate: ParameterSet) -> None:
+        classes = candidate.get(DetectorParameters).classes
         try:
-            self._measurement.detector.class_ids(wanted)
+            self._measurement.detector.class_ids(classes)
         except DetectorError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+            raise ParameterError("detector.classes", classes, f"classes of the model ({error})") from None
 
     def _on_settings(self, settings: ParameterSet) -> None:
         limit_threads(settings.value.threads)
@@ -155,4 +153,4 @@ def _parameters_of(settings: ParameterSet) -> BoxMetricParameters:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; see `vergence_common.node_main`."""
-    return run_node(BoxMetricNode, args)
+    return run_node(BoxMetricNode, args, GROUPS)

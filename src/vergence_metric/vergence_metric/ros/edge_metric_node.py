@@ -159,4 +159,4 @@ def _measurement_parameters(settings: ParameterSet) -> PairMeasurementParameters
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; see `vergence_common.node_main`."""
-    return run_node(EdgeMetricNode, args)
+    return run_node(EdgeMetricNode, args, GROUPS)

@@ -102,4 +102,4 @@ def _encoder_parameters(settings: ParameterSet) -> EncoderParameters:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; see `vergence_common.node_main`."""
-    return run_node(EyeRotationNode, args)
+    return run_node(EyeRotationNode, args, GROUPS)

@@ -281,6 +281,7 @@ class StereoInput:
         for side, name in enumerate(SIDES):
             if self._info_errors[side] is not None:
                 return Report(ERROR, f"{name}/camera_info: {self._info_errors[side]}")
+        for side, name in enumerate(SIDES):
             model, size = self.models[side], self._health[side].size_px
             if model is None:
                 return Report(WARN, f"{name}/camera_info: no message yet; angles are NaN")

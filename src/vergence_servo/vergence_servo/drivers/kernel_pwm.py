@@ -6,6 +6,7 @@ for that.
 
 import errno
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -172,4 +173,9 @@ def _explained(error: OSError) -> DriverIoError:
     return DriverIoError(error.errno or errno.EIO, text, error.filename)
 
 
-BACKEND = Backend("kernel_pwm", KernelPwmParameters, KernelPwmDriver)
+def _hardware(parameters: KernelPwmParameters, channels: Sequence[int]) -> list[str]:
+    chip = _find_chip(Path(parameters.root), parameters.chip).resolve()
+    return [f"channel {channel} of {chip}" for channel in channels]
+
+
+BACKEND = Backend("kernel_pwm", KernelPwmParameters, KernelPwmDriver, hardware=_hardware)

@@ -5,6 +5,7 @@ wire its OE pin (docs/servos.md).
 """
 
 import errno
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,4 +113,9 @@ def _open(library: Any, bus: Any, values: Pca9685Parameters) -> Any:
     return chip
 
 
-BACKEND = Backend("pca9685", Pca9685Parameters, Pca9685Driver)
+def _hardware(parameters: Pca9685Parameters, channels: Sequence[int]) -> list[str]:
+    # The whole chip: opening it sets the frequency of all its channels.
+    return [f"PCA9685 at address 0x{parameters.address:02X}"]
+
+
+BACKEND = Backend("pca9685", Pca9685Parameters, Pca9685Driver, hardware=_hardware)

@@ -8,6 +8,7 @@ dies.
 import errno
 import socket
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vergence_rig.parameters import Parameters, parameter
@@ -110,4 +111,8 @@ def _checked(gpio: int) -> int:
     return gpio
 
 
-BACKEND = Backend("pigpio", PigpioParameters, PigpioDriver)
+def _hardware(parameters: PigpioParameters, channels: Sequence[int]) -> list[str]:
+    return [f"GPIO {channel} of the pigpio daemon at {parameters.host}:{parameters.port}" for channel in channels]
+
+
+BACKEND = Backend("pigpio", PigpioParameters, PigpioDriver, hardware=_hardware)

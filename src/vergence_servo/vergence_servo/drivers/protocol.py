@@ -1,6 +1,6 @@
 """The interface of a servo driver, its entry in the registry, and its errors."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -59,6 +59,8 @@ class Backend:
         open: makes the driver from an instance of them; may raise DriverUnavailableError.
         moves_servos: False for one without hardware, which the built-in servos.yaml is good enough for.
         warning: logged at the start; empty for none.
+        hardware: names the pieces of hardware that these channels need with these parameters, each of which one process
+            may own; None for a backend without hardware of its own. It may raise DriverUnavailableError.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Backend:
     open: Callable[[Any], ServoDriver]
     moves_servos: bool = True
     warning: str = ""
+    hardware: Callable[[Any, Sequence[int]], list[str]] | None = None
 
 
 def on_grid(pulse_us: float, resolution_us: float) -> float:

@@ -58,11 +58,13 @@ class ServoNode(Node):
             name: servo_limits(name, servos[name], rig.joints[name] if name in JOINT_NAMES else None)
             for name in values.joints
         }
-        self._drivers = DriverSet(backends, lambda backend: dataclasses.asdict(self._settings.get(backend.parameters)))
+        channels = {name: limit.calibration.channel for name, limit in limits.items()}
+        self._drivers = DriverSet(
+            backends, lambda backend: dataclasses.asdict(self._settings.get(backend.parameters)), channels
+        )
         self._guardians: Guardians | None = None
         try:
             if values.guardian:
-                channels = {name: limit.calibration.channel for name, limit in limits.items()}
                 self._guardians = Guardians(self._drivers, channels)
             self._pose_file = Path(values.pose_file) if values.pose_file else default_pose_file()
             self._pose = read_pose(self._pose_file)
@@ -237,7 +239,7 @@ class ServoNode(Node):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return run_node(ServoNode, args)
+    return run_node(ServoNode, args, parameter_groups())
 
 
 if __name__ == "__main__":

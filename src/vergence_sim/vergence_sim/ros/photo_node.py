@@ -128,4 +128,4 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; see `vergence_common.node_main`."""
-    return run_node(PhotoNode, args)
+    return run_node(PhotoNode, args, GROUPS)

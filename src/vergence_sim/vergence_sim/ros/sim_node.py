@@ -66,4 +66,4 @@ class SimNode(RealTimeNode):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; see `vergence_common.node_main`."""
-    return run_node(SimNode, args)
+    return run_node(SimNode, args, NODE_GROUPS)

@@ -21,6 +21,7 @@ from vergence_bringup.graph_errors import GraphError
 from vergence_common.images import image_to_array
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_common.stamps import to_nanoseconds
+from vergence_common.start import init
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, TrueVergence
 
@@ -56,7 +57,7 @@ class Recorder:
     def __init__(self, domain_id: int | None = None, stepped: bool = False) -> None:
         """Subscribe in a DDS domain, None for the environment's; `stepped` steps the simulator's time."""
         if not rclpy.ok():
-            rclpy.init(domain_id=domain_id)
+            init(domain_id=domain_id)
         self.node = Node("vergence_demo")
         self._changed = threading.Condition()
         self.time: Timeline

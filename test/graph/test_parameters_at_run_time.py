@@ -1,0 +1,114 @@
+"""No value of any parameter ends a running node: what a node cannot use is refused with the parameter's name."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from vergence_bringup.node_table import NODES, parameter_groups
+from vergence_camera.ros.camera_node import CameraNode
+from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
+from vergence_metric.ros.box_metric_node import BoxMetricNode
+from vergence_metric.ros.edge_metric_node import EdgeMetricNode
+from vergence_metric.ros.eye_rotation_node import EyeRotationNode
+from vergence_rig.testing.odd_values import ODD_VALUES
+from vergence_servo.ros.servo_node import ServoNode
+from vergence_sim.ros.photo_node import PhotoNode
+from vergence_sim.ros.sim_node import SimNode
+
+pytestmark = pytest.mark.graph
+
+KINDS: dict[str, Callable[..., Node]] = {
+    "box_metric_node": BoxMetricNode,
+    "camera_node": CameraNode,
+    "edge_metric_node": EdgeMetricNode,
+    "eye_rotation_node": EyeRotationNode,
+    "gaze_controller_node": GazeControllerNode,
+    "photo_node": PhotoNode,
+    "servo_node": ServoNode,
+    "sim_node": SimNode,
+}
+
+
+def _given(executable: str, folder: Path) -> dict[str, Any]:
+    """Return the parameters with which a node starts without hardware."""
+    image = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
+    pictures = [folder / "left.png", folder / "right.png"]
+    for picture in pictures:
+        cv2.imwrite(str(picture), image)
+    given: dict[str, dict[str, Any]] = {
+        "camera_node": {"device": str(folder), "width_px": 160, "height_px": 120},
+        "photo_node": {"left": str(pictures[0]), "right": str(pictures[1])},
+        "servo_node": {"backend": "fake", "pose_file": str(folder / "pose.json")},
+    }
+    return given.get(executable, {})
+
+
+def _message(name: str, value: object) -> Any:
+    return Parameter(name, value=value).to_parameter_msg()
+
+
+class Client:
+    """Sets parameters of a node as `ros2 param set` does."""
+
+    def __init__(self, graph: Any, node: Node) -> None:
+        self._graph = graph
+        name = node.get_fully_qualified_name()
+        self._set = graph.client.create_client(SetParameters, f"{name}/set_parameters")
+        self._get = graph.client.create_client(GetParameters, f"{name}/get_parameters")
+        graph.wait_until(lambda: self._set.service_is_ready() and self._get.service_is_ready(), "parameter services")
+
+    def set(self, parameters: list[Any]) -> list[Any]:
+        return list(self._graph.wait(self._set.call_async(SetParameters.Request(parameters=parameters))).results)
+
+    def get(self, names: list[str]) -> list[Any]:
+        return list(self._graph.wait(self._get.call_async(GetParameters.Request(names=names))).values)
+
+
+def test_every_node_is_tried() -> None:
+    assert set(KINDS) == set(NODES)
+
+
+@pytest.mark.parametrize("executable", sorted(KINDS))
+def test_no_value_of_any_parameter_ends_the_node(
+    executable: str, graph: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    if executable == "sim_node":
+        request.getfixturevalue("opengl")
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "ros"))
+    node = graph.start(KINDS[executable], **_given(executable, tmp_path))
+    client = Client(graph, node)
+    names = [prefix + spec.name for prefix, group in parameter_groups(executable) for spec in group.specs()]
+    before = dict(zip(names, client.get(names), strict=True))
+    for name in [*names, "use_sim_time"]:
+        results = client.set([_message(name, value) for value in ODD_VALUES])
+        for value, result in zip(ODD_VALUES, results, strict=True):
+            # Two parameters may contradict each other: then it is the other that is named.
+            named = any(f"'{known}'" in result.reason for known in names) or name in result.reason
+            assert result.successful or named, (name, value, result.reason)
+        if name in names:
+            node.set_parameters([Parameter.from_parameter_msg(_restored(name, before[name]))])
+        else:
+            assert client.set([_message(name, False)])[0].successful
+    assert dict(zip(names, client.get(names), strict=True)) == before
+
+
+def _restored(name: str, value: Any) -> Any:
+    message = _message(name, 0)
+    message.value = value
+    return message
+
+
+def test_a_list_of_wrong_elements_is_refused_by_name(graph: Any) -> None:
+    node = graph.start(BoxMetricNode)
+    for value in ([0], True, [1.5], ["nonesuch"], ["²"], ["9" * 400]):
+        result = graph.set_parameters(node, **{"detector.classes": value})
+        assert not result.successful
+        assert "'detector.classes'" in result.reason
+    assert graph.set_parameters(node, **{"detector.classes": ["0"]}).successful
