@@ -113,10 +113,10 @@ def test_what_lies_beside_or_behind_a_requested_point_is_refused() -> None:
     [
         (joints(0.3, HERE), False, 0.0, 0.0),  # aside at its depth: at once
         (joints(0.3, HERE), True, 0.0, 0.0),
-        (joints(0.3, NEAR), False, 0.05, 0.1),  # aside at another depth: a moment
-        (joints(0.0, FAR), False, 0.05, 0.1),
+        (joints(0.3, NEAR), False, 0.0, 0.0),  # at rest also at another depth
+        (joints(0.0, FAR), False, 0.0, 0.0),
         (joints(0.0, FAR), True, 0.3, 0.4),  # of a target that moves: it may be passing another
-        (np.array([0.3, math.nan, 0.0]), False, 0.05, 0.1),  # one eye alone sees it elsewhere
+        (np.array([0.3, math.nan, 0.0]), True, 0.3, 0.4),  # one eye alone sees it elsewhere
         (joints(0.02, HERE), False, 0.0, 0.0),  # in its place
     ],
 )
@@ -149,7 +149,7 @@ def test_seen_in_its_place_again_it_starts_anew() -> None:
 
 
 def test_of_a_track_whose_depth_jumps_the_direction_counts() -> None:
-    gate, target = JumpGate(P), estimate()
+    gate, target = JumpGate(P), estimate(moving=True)
     verdict = gate.check(sighting(joints(0.5 * (NEAR - HERE), NEAR), source="track"), target)
     assert verdict.accepted
     assert verdict.direction_only

@@ -55,19 +55,12 @@ class TargetParameters(Parameters):
         maximum=0.5,
     )
     same_depth_rad: float = parameter(
-        0.006,
+        0.01,
         "difference in vergence, beyond the object's own depth and the noise, up to which a sighting is at the "
         "target's depth",
         unit="rad",
         minimum=0.0005,
         maximum=0.5,
-    )
-    depth_rest_s: float = parameter(
-        0.06,
-        "time that a target at rest must be measured at another depth before it is taken to have moved there",
-        unit="s",
-        minimum=0,
-        maximum=60,
     )
     depth_moving_s: float = parameter(
         0.35,

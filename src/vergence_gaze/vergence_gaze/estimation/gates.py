@@ -196,9 +196,8 @@ class JumpGate:
     """Refuses what is at another place or depth than the target until it has been measured there for long enough.
 
     Objects keep their depth. What is elsewhere at the target's depth is the target at once. At another depth it takes
-    a moment, longer if the target was moving, for then another object is likelier to pass; and longest while another
-    source still shows the target where it was expected. Of a track, which is known by its looks, the direction counts
-    even then.
+    time if the target was moving, for then another object is likelier to pass; and longest while another source still
+    shows the target where it was expected. Of a track, which is known by its looks, the direction counts even then.
     """
 
     def __init__(self, parameters: TargetParameters) -> None:
@@ -233,9 +232,7 @@ class JumpGate:
         others = (in_place_s for other, in_place_s in self._in_place_s.items() if other != source)
         if max(others, default=-math.inf) > since_s:
             return self._p.distractor_persistence_s
-        if not deeper:
-            return 0.0
-        return self._p.depth_moving_s if estimate.moving else self._p.depth_rest_s
+        return self._p.depth_moving_s if deeper and estimate.moving else 0.0
 
 
 class NewerGate:
