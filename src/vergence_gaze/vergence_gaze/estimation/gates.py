@@ -36,6 +36,7 @@ Array = npt.NDArray[np.float64]
 
 _SAME_PAIR_S = 0.012  # stamps of one pair, from two nodes, differ by less
 _KEPT_PAIRS = 30  # a second of tracks, to compare with boxes that arrive later
+_DEPTH_SIGMAS = 2.0  # of the estimated vergence that count as its noise: that of a manoeuvring target grows fast
 _BOXES_IN_MEAN = 4  # boxes whose middle is averaged, as a fading mean
 
 
@@ -259,7 +260,7 @@ def _is_aside(sighting: Sighting, estimate: TargetEstimate, p: TargetParameters)
 def _is_deeper(sighting: Sighting, estimate: TargetEstimate, p: TargetParameters) -> bool:
     """Return whether a sighting's depth differs by more than the object's own depth and the noise explain."""
     off_rad = abs(sighting.vergence_rad - estimate.vergence_rad)
-    return off_rad > p.same_depth_rad + sighting.own_depth_rad + 2.0 * float(estimate.sigmas_rad[1])
+    return off_rad > p.same_depth_rad + sighting.own_depth_rad + _DEPTH_SIGMAS * float(estimate.sigmas_rad[1])
 
 
 def _surrounds(box: Sighting, track: Sighting, p: TargetParameters) -> bool:
