@@ -91,7 +91,7 @@ def test_starts_with_the_shipped_yaml_and_ends_cleanly(domain_id: int, number: s
             "parameter 'track_saccade_deg' was renamed: set 'tracker.saccade_rad' (in rad) instead",
         ),
         ("/**: {ros__parameters: {rig: /nowhere/rig.yaml}}", "/nowhere/rig.yaml"),
-        ("{ not: [yaml", "Couldn't parse params file"),
+        ("{ not: [yaml", "is not YAML"),
     ],
     ids=[
         "mistyped",
