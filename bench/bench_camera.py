@@ -25,6 +25,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage
 
+from bench.process_cost import cpu_s, end
 from bench.results import Row
 from vergence_bringup.ros.processes import NodeCommand, environment
 from vergence_camera.sources.recordings import AviRecording
@@ -133,10 +134,10 @@ def measure(commands: Sequence[Sequence[str]], file: Path, duration_s: float = _
         processes = [stack.enter_context(_running(command, domain)) for command in commands]
         _spin(executor, lambda: all(len(subscriber.pictures[eye]) > RATE_HZ for eye in _EYES), _START_S)
         subscriber.clear()
-        before, began = [_cpu_s(process.pid) for process in processes], time.monotonic()
+        before, began = [cpu_s(process.pid) for process in processes], time.monotonic()
         _spin(executor, lambda: time.monotonic() - began > duration_s, duration_s + 5.0)
         elapsed = time.monotonic() - began
-        cpu = [(_cpu_s(p.pid) - b) / elapsed for p, b in zip(processes, before, strict=True)]
+        cpu = [(cpu_s(p.pid) - b) / elapsed for p, b in zip(processes, before, strict=True)]
         outcome = Outcome(
             cpu=statistics.mean(cpu),
             lost=sum(_missing(pictures, len(numbers)) for pictures in subscriber.pictures.values())
@@ -210,17 +211,7 @@ def _running(command: Sequence[str], domain: int) -> "Iterator[subprocess.Popen[
         yield process
     finally:
         process.terminate()
-        try:
-            process.wait(10.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-
-
-def _cpu_s(pid: int) -> float:
-    """Return the CPU time of a process's threads so far, to the nanosecond: clock ticks are too coarse for this."""
-    threads = Path(f"/proc/{pid}/task").iterdir()
-    return sum(int((thread / "schedstat").read_text().split()[0]) for thread in threads) * 1e-9
+        end(process, 10.0)
 
 
 def _spin(executor: SingleThreadedExecutor, until: Callable[[], bool], timeout_s: float) -> None:

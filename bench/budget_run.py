@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench.budget_recording import RATE_HZ, calibration_of
+from bench.process_cost import cpu_s, end, rss_mb
 from bench.results import OUT_DIR
 from vergence_bringup.ros.processes import Command, NodeCommand, ProcessGroup, environment, find_node
 from vergence_common.domains import own_domain
@@ -78,11 +79,11 @@ def measure(
                 time.sleep(_STARTED_S)
                 subprocess.run([sys.executable, "-m", "bench.budget_goal"], env=environment(extra), check=True)
             time.sleep(settled_s)
-            before, began = {name: _cpu_s(pid) for name, pid in pids.items()}, time.monotonic()
+            before, began = {name: cpu_s(pid) for name, pid in pids.items()}, time.monotonic()
             time.sleep(MEASURED_S)
             nodes.check()
             elapsed = time.monotonic() - began
-            return {name: Share((_cpu_s(pid) - before[name]) / elapsed, _rss_mb(pid)) for name, pid in pids.items()}
+            return {name: Share((cpu_s(pid) - before[name]) / elapsed, rss_mb(pid)) for name, pid in pids.items()}
 
 
 @contextmanager
@@ -99,19 +100,4 @@ def _empty_nodes(kinds: Sequence[str], extra: dict[str, str]) -> Iterator[dict[s
         for process in running.values():
             process.terminate()
         for process in running.values():
-            try:
-                process.wait(5.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-
-
-def _cpu_s(pid: int) -> float:
-    """Return the CPU time of a process's threads so far, to the nanosecond: clock ticks are too coarse for this."""
-    threads = Path(f"/proc/{pid}/task").iterdir()
-    return sum(int((thread / "schedstat").read_text().split()[0]) for thread in threads) * 1e-9
-
-
-def _rss_mb(pid: int) -> float:
-    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
-    return int(status.partition("VmRSS:")[2].split()[0]) / 1024.0
+            end(process, 5.0)

@@ -18,7 +18,7 @@ from bench.photos_data import pair_names, pair_of, photographs_rig, targets
 from bench.results import Row
 from vergence_metric.measurement.edge_metric import EdgeMetric
 from vergence_rig.servo import IDEAL
-from vergence_rig.verged import VergedLimits, best_small_window
+from vergence_rig.verged import VergedLimits
 from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.world import PhotoWorld
 
@@ -53,9 +53,8 @@ def measured(names: list[str]) -> Contrasts:
                 world.head.place(pose, 0.0, dict.fromkeys(pose, 0.0))
                 seen = metric.measure(world.view("left"), world.view("right"))
                 metric.update_alignment()
-                best = best_small_window(seen.windows_px.tolist(), seen.contrast.tolist())
-                if best is not None:
-                    (off if off_deg else verged).append(float(seen.contrast[best]))
+                if math.isfinite(seen.least_contrast.contrast):
+                    (off if off_deg else verged).append(seen.least_contrast.contrast)
     return Contrasts(np.array(verged), np.array(off))
 
 

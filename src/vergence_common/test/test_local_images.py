@@ -19,7 +19,7 @@ def test_every_receiver_of_a_topic_gets_the_very_image() -> None:
     assert [(name, one is header, two is pixels) for name, one, two in got] == [("a", True, True), ("b", True, True)]
 
 
-def test_nobody_receives_what_is_not_wanted() -> None:
+def test_what_is_not_wanted_has_no_receiver() -> None:
     images = LocalImages()
     images.deliver("/left/image_raw", Header(), np.zeros((2, 3), np.uint8))
     assert not images.wanted("/left/image_raw")

@@ -1,4 +1,4 @@
-"""The command line of an executable that runs nodes: what is ROS's, what nobody reads, and `--help`."""
+"""The command line of an executable that runs nodes: what is ROS's, what is left over, and `--help`."""
 
 import shlex
 import textwrap

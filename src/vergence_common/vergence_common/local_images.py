@@ -36,7 +36,7 @@ class LocalImages:
         self._receivers[topic].append(receiver)
 
     def wanted(self, topic: str) -> bool:
-        """Return whether somebody receives a topic's images."""
+        """Return whether a topic's images have a receiver."""
         return bool(self._receivers.get(topic))
 
     def deliver(self, topic: str, header: Header, pixels: Pixels) -> None:

@@ -226,5 +226,5 @@ def test_the_tracking_reports_the_reason_of_the_gate_that_refused() -> None:
     assert tracking.note == "the tracker has not found the requested target yet"
     assert not tracking.update_track(replace(TRACK, stamp_s=1.07, usable=False, reason="it is hidden"), 1.1)
     assert tracking.note == "it is hidden"
-    assert not tracking.update_box(BOX, 1.1), "nobody has asked for boxes"
+    assert not tracking.update_box(BOX, 1.1), "boxes were not asked for"
     assert tracking.note == "it is hidden"

@@ -230,13 +230,14 @@ class Perception:
         probability = 1.0
         # A target that moves, or may move, can be elsewhere by now: there one pair is never enough.
         if self.tracking.filter.surely_at_rest and not by_point and math.isfinite(visual.error_rad[1]):
-            limit, off, sigmas = self._p.verged.leave_rad, estimate.joints_rad - joints, estimate.joint_sigmas_rad
+            p, off, sigmas = self._p.verged, estimate.joints_rad - joints, estimate.joint_sigmas_rad
             measured_error = Gaussian(vergence_error, float(estimate.sigmas_rad[1]))
-            p = self._p.verged
             probability = probability_beyond_limit(
-                self._predicted_error, measured_error, limit, p.wrong_share, p.wrong_range_rad
+                self._predicted_error, measured_error, p.leave_rad, p.wrong_share, p.wrong_range_rad
             )
-            probability += sum(Gaussian(float(off[i]), float(sigmas[i])).probability_beyond(limit) for i in judged)
+            probability += sum(
+                Gaussian(float(off[i]), float(sigmas[i])).probability_beyond(p.leave_rad) for i in judged
+            )
         objection = self.tracking.ambiguity
         self.judge.update_pair(stamp_s, now_s, error, steady, verging, probability, direction_error, objection)
 

@@ -3,10 +3,9 @@
 import math
 from dataclasses import dataclass
 
+from vergence_gaze.estimation.observations import SAME_PAIR_S
 from vergence_gaze.verged_parameters import VergedParameters
 from vergence_rig.verged import objection
-
-_SAME_PAIR_S = 0.012  # stamps of one pair, from two nodes, differ by less
 
 
 @dataclass(frozen=True)
@@ -165,7 +164,7 @@ class VergenceJudge:
         return not doubt
 
     def _is_own_contrast(self, pair: PairEvidence) -> bool:
-        return abs(pair.stamp_s - self._contrast_s) <= _SAME_PAIR_S
+        return abs(pair.stamp_s - self._contrast_s) <= SAME_PAIR_S
 
     def _uses_contrast(self, now_s: float) -> bool:
         if self._p.contrast == "when_seen":

@@ -27,14 +27,13 @@ import numpy.typing as npt
 
 from vergence_gaze.estimation.exposures import Exposures
 from vergence_gaze.estimation.kalman import Measurement
-from vergence_gaze.estimation.observations import BoxSighting, PointSighting, TrackSighting
+from vergence_gaze.estimation.observations import SAME_PAIR_S, BoxSighting, PointSighting, TrackSighting
 from vergence_gaze.estimation.target_filter import TargetEstimate
 from vergence_gaze.goals.requested_point import RequestedPoint
 from vergence_gaze.target_parameters import TargetParameters
 
 Array = npt.NDArray[np.float64]
 
-_SAME_PAIR_S = 0.012  # stamps of one pair, from two nodes, differ by less
 _KEPT_PAIRS = 30  # a second of tracks, to compare with boxes that arrive later
 _DEPTH_SIGMAS = 2.0  # of the estimated vergence that count as its noise: that of a manoeuvring target grows fast
 _BOXES_IN_MEAN = 4  # boxes whose middle is averaged, as a fading mean
@@ -136,7 +135,7 @@ class RequestGate:
     stream: bool = False
 
     def check(self, sighting: Sighting, estimate: TargetEstimate | None) -> Verdict:
-        """See Gate. What nobody has asked for is refused without a reason."""
+        """See Gate. What was not asked for is refused without a reason."""
         seen = sighting.observation
         if isinstance(seen, PointSighting):
             return Verdict(self.stream)
@@ -180,7 +179,7 @@ class ClassGate:
     def check(self, sighting: Sighting, estimate: TargetEstimate | None) -> Verdict:
         """See Gate. Boxes are accepted, and confirm the track that they are around."""
         if sighting.source == "box":
-            same = [track for track in self._tracks if abs(track.stamp_s - sighting.stamp_s) < _SAME_PAIR_S]
+            same = [track for track in self._tracks if abs(track.stamp_s - sighting.stamp_s) < SAME_PAIR_S]
             if same and _surrounds(sighting, same[-1], self._p):
                 self._confirmed_s = max(self._confirmed_s, sighting.stamp_s)
                 self._compared = min(self._compared + 1, _BOXES_IN_MEAN)

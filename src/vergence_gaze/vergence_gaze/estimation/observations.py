@@ -9,6 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
+SAME_PAIR_S = 0.012
+"""Results of one pair, from two nodes, have stamps that differ by less."""
+
 
 @dataclass(frozen=True)
 class JointReport:

@@ -36,6 +36,11 @@ _MINIMUM_WEIGHT = 0.3
 _FOLLOWING_VARIANCE = 1e-5
 
 
+def joints_of(angles_rad: Array) -> Array:
+    """Return pan_left, pan_right, tilt (3,) for version, vergence, tilt (3,)."""
+    return np.asarray(_TO_JOINTS @ angles_rad, np.float64)
+
+
 @dataclass(frozen=True)
 class TargetEstimate:
     """The target at one time: angles that fixate it (3,) [rad], rates (3,) [rad/s], covariance of the angles (3, 3)."""
@@ -63,7 +68,7 @@ class TargetEstimate:
     @property
     def joints_rad(self) -> Array:
         """Joint angles (3,), pan_left, pan_right, tilt, that fixate the target."""
-        return _TO_JOINTS @ self.angles_rad
+        return joints_of(self.angles_rad)
 
     @property
     def joint_rates_rad_s(self) -> Array:

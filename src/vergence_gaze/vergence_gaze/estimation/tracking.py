@@ -28,6 +28,7 @@ from vergence_gaze.estimation.gates import (
 from vergence_gaze.estimation.kalman import Measurement
 from vergence_gaze.estimation.observations import BoxSighting, PointSighting, TrackSighting
 from vergence_gaze.estimation.target_estimator import TargetEstimator
+from vergence_gaze.estimation.target_filter import joints_of
 from vergence_gaze.goals.goal import TrackRequest
 from vergence_gaze.goals.requested_class import RequestedClass
 from vergence_gaze.goals.requested_point import RequestedPoint
@@ -55,24 +56,26 @@ class TargetTracking(TargetEstimator):
 
     def clear(self) -> None:
         """Remove the target and the request for it."""
+        self._start(RequestGate())
+
+    def _start(
+        self, asked: RequestGate, point: RequestedPoint | None = None, by_class: RequestedClass | None = None
+    ) -> None:
+        """Remove the target, and pass sightings through the gates of what is asked for from now on."""
         self.remove_target()
-        self.point: RequestedPoint | None = None
+        self.point, self._class, self._asked = point, by_class, asked
         self.ambiguity = ""
         """Which distances the target may have, while several fit."""
-        self._class: RequestedClass | None = None
         self._request: TrackRequest | None = None
         self._history.play.restart()
-        self._set_gates(RequestGate())
-
-    def _set_gates(self, asked: RequestGate) -> None:
-        self._asked, self._newer, self._class_gate = asked, NewerGate(), ClassGate(self._p.target)
+        self._newer, self._class_gate = NewerGate(), ClassGate(self._p.target)
         seen: list[Gate] = [asked, MeasuredGate(), StillGate(self._exposures)]
-        by_class: list[Gate] = [self._class_gate] if self._class is not None else []
-        at_point: list[Gate] = [PointGate(self.point)] if self.point is not None else []
+        of_class: list[Gate] = [self._class_gate] if by_class is not None else []
+        at_point: list[Gate] = [PointGate(point)] if point is not None else []
         jump = JumpGate(self._p.target)
         self._gates: dict[str, list[Gate]] = {
-            "track": [*seen, *at_point, *by_class, jump],
-            "box": [*seen, *by_class, jump, self._newer],
+            "track": [*seen, *at_point, *of_class, jump],
+            "box": [*seen, *of_class, jump, self._newer],
             "point": [asked],
         }
 
@@ -91,28 +94,27 @@ class TargetTracking(TargetEstimator):
 
         Only the tracker's answer for this goal is the target, and nothing else that lies near the fovea.
         """
-        self.clear()
-        self._set_gates(RequestGate(goal_id))
-        self.filter.initialise(stamp_s, angles_rad, covariance)
-        self.seen_s = now_s
+        self._start(RequestGate(goal_id))
+        self._expect(now_s, stamp_s, angles_rad, covariance)
 
     def request_point(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array, goal_id: int) -> None:
         """Start with a point in space, as `request_target`: only what the tracker sees there updates it."""
-        self.request_target(now_s, stamp_s, angles_rad, covariance, goal_id)
-        joints_rad = self.filter.at(stamp_s).joints_rad
-        self.point = RequestedPoint(goal_id, joints_rad, self._p.target, self._p.control.no_images_s)
-        self._set_gates(RequestGate(goal_id))
+        answer_within_s = self._p.control.no_images_s
+        point = RequestedPoint(goal_id, joints_of(angles_rad), self._p.target, answer_within_s)
+        self._start(RequestGate(goal_id), point=point)
+        self._expect(now_s, stamp_s, angles_rad, covariance)
+
+    def _expect(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
+        self.filter.initialise(stamp_s, angles_rad, covariance)
+        self.seen_s = now_s
 
     def request_class(self, class_name: str, goal_id: int) -> None:
         """Start with any target of a detected class ("": of any class), wherever it is."""
-        self.clear()
-        self._class = RequestedClass(goal_id, self._p.target.lost_after_s)
-        self._set_gates(RequestGate(goal_id, class_name))
+        self._start(RequestGate(goal_id, class_name), by_class=RequestedClass(goal_id, self._p.target.lost_after_s))
 
     def request_stream(self) -> None:
         """Start with the next point of the stream."""
-        self.clear()
-        self._set_gates(RequestGate(stream=True))
+        self._start(RequestGate(stream=True))
 
     def pop_track_request(self) -> TrackRequest | None:
         """Return and remove what the tracker is to be asked for a class."""
@@ -147,8 +149,9 @@ class TargetTracking(TargetEstimator):
 
         accepted = self._consider(Sighting("box", box, locate, box.skew_s, box.extent_rad), now_s)
         if accepted and self._class is not None:
-            self._request = self._class.request(box, now_s) or self._request
-            if self._request is not None:
+            request = self._class.request(box, now_s)
+            if request is not None:
+                self._request = request
                 self._class_gate.restart(box.stamp_s)
         return accepted
 
@@ -158,8 +161,7 @@ class TargetTracking(TargetEstimator):
         def locate() -> tuple[Measurement, Array]:
             sigma = positive_sigma(point.sigma_rad, self._p.target.point_sigma_rad)
             measurement = directions.point(self._history, point.stamp_s, point.point_m, self._baseline_m, sigma)
-            version, vergence, tilt = measurement.values
-            return measurement, np.array([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
+            return measurement, joints_of(measurement.values)
 
         return self._consider(Sighting("point", point, locate), now_s)
 

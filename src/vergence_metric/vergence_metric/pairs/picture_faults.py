@@ -71,7 +71,7 @@ class _Eye:
         return ("is frozen: the same picture with new stamps", False) if frozen else ("", False)
 
     def _watch_noise(self, change: Thumbnail) -> None:
-        """Noise is told from motion by its sign: successive changes by noise correlate by -0.5, those by motion do not.
+        """Noise and motion differ in sign: successive changes by noise correlate by -0.5, those by motion do not.
 
         A simulator without noise shows the same picture while nothing moves.
         """

@@ -149,35 +149,30 @@ class StereoInput:
 
     def _on_local(self, side: int, header: Header, pixels: npt.NDArray[np.uint8]) -> None:
         """Receive an image in the thread that delivers it."""
-        self._on_frame(side, ImageFrame(header, pixels, monotonic_ns()))
+        self._on_frame(side, ImageFrame(header, pixels, monotonic_ns()), self._age_s(header))
 
-    def _on_frame(self, side: int, frame: ImageFrame) -> None:
-        stamp_ns, now_ns = to_nanoseconds(frame.header.stamp), frame.arrived_ns
-        age_s = (self._node.get_clock().now().nanoseconds - stamp_ns) * 1e-9
+    def _on_frame(self, side: int, frame: ImageFrame, age_s: float) -> None:
+        now_ns = frame.arrived_ns
         self._health[side].accept(now_ns * 1e-9, age_s, (frame.pixels.shape[1], frame.pixels.shape[0]))
-        self._emit(self._pairer.add(side, stamp_ns, frame, now_ns))
+        self._emit(self._pairer.add(side, to_nanoseconds(frame.header.stamp), frame, now_ns))
 
     def _on_image(self, side: int, message: Any) -> None:
-        now_ns = monotonic_ns()
-        if self._images is not None:
-            shared = self._decoded(side, message, now_ns)
-            if shared is not None:
-                with self._lock:
-                    self._on_frame(side, shared)
-                    self._images.deliver(self._topics[side], shared.header, shared.pixels)
-            return
-        health = self._health[side]
-        stamp_ns = to_nanoseconds(message.header.stamp)
-        age_s = (self._node.get_clock().now().nanoseconds - stamp_ns) * 1e-9
-        if self._is_due is not None:
-            health.count(now_ns * 1e-9, age_s)
+        now_ns, age_s = monotonic_ns(), self._age_s(message.header)
+        if self._is_due is not None and self._images is None:
+            stamp_ns = to_nanoseconds(message.header.stamp)
+            self._health[side].count(now_ns * 1e-9, age_s)
             self._emit(self._pairer.add(side, stamp_ns, _Undecoded(message, now_ns), now_ns))
             return
         frame = self._decoded(side, message, now_ns)
         if frame is None:
             return
-        health.accept(now_ns * 1e-9, age_s, (frame.pixels.shape[1], frame.pixels.shape[0]))
-        self._emit(self._pairer.add(side, stamp_ns, frame, now_ns))
+        with self._lock:
+            self._on_frame(side, frame, age_s)
+            if self._images is not None:
+                self._images.deliver(self._topics[side], frame.header, frame.pixels)
+
+    def _age_s(self, header: Header) -> float:
+        return float(self._node.get_clock().now().nanoseconds - to_nanoseconds(header.stamp)) * 1e-9
 
     def _decoded(self, side: int, message: Any, arrived_ns: int) -> ImageFrame | None:
         health = self._health[side]
