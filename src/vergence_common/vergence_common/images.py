@@ -13,8 +13,12 @@ import numpy.typing as npt
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
+from vergence_rig.picture_file import decode_picture
+from vergence_rig.regular_file import FileError
+
 Array = npt.NDArray[np.uint8]
 
+_AS_SENT = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
 _CHANNELS = {"bgr8": 3, "rgb8": 3, "mono8": 1}
 
 
@@ -87,12 +91,10 @@ def array_to_image(pixels: Array, header: Header, encoding: str = "bgr8") -> Ima
 
 def compressed_to_array(message: CompressedImage) -> Array:
     """Return the pixels of a JPEG or PNG message: uint8 (h, w, 3) BGR. Raises ImageError where it cannot be decoded."""
-    if len(message.data) == 0:
-        raise ImageError("compressed data must be a whole JPEG or PNG: got 0 bytes")
-    pixels = cv2.imdecode(np.frombuffer(message.data, dtype=np.uint8), cv2.IMREAD_COLOR)
-    if pixels is None:
-        raise ImageError(f"compressed data of {len(message.data)} bytes (format {message.format!r}) cannot be decoded")
-    return np.asarray(pixels)
+    try:
+        return decode_picture(np.frombuffer(message.data, dtype=np.uint8), _AS_SENT)
+    except FileError as error:
+        raise ImageError(f"compressed data {error}, format {message.format!r}") from error
 
 
 def array_to_compressed(pixels: Array, header: Header, quality: int = 90) -> CompressedImage:

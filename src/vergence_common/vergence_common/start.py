@@ -7,7 +7,6 @@ import re
 import tempfile
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -17,6 +16,7 @@ from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
 from vergence_common.arguments import remaps
+from vergence_rig.regular_file import expanded
 from vergence_rig.yaml_file import YamlFileError, read_yaml
 
 LARGEST_DOMAIN_ID = 232
@@ -102,7 +102,7 @@ def _ensure_home() -> None:
 def _check_log_folder() -> None:
     places = (("ROS_LOG_DIR", ""), ("ROS_HOME", "log"), ("HOME", ".ros/log"))
     name, below = next(((name, below) for name, below in places if os.environ.get(name)), ("HOME", ""))
-    folder = Path(os.environ[name]).expanduser() / below
+    folder = expanded(os.environ[name]) / below
     try:
         folder.mkdir(parents=True, exist_ok=True)
         reason = "" if os.access(folder, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)

@@ -1,44 +1,31 @@
 """The one way to read a YAML file: kind, size, depth, numbers and keys are checked, and every fault is one line."""
 
-import os
-import stat
+import re
 from collections.abc import Hashable
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from vergence_rig.regular_file import FileError, read_regular_file
+
 LARGEST_BYTES = 1_000_000
 DEEPEST = 20
 LONGEST_INTEGER = 20
 
 
-class YamlFileError(ValueError):
+class YamlFileError(FileError):
     """A file that cannot be used: the message says why, and does not name the file."""
 
 
 def read_small_text(path: str | Path) -> str:
     """Return the text of a regular file of at most LARGEST_BYTES. Raises YamlFileError; never waits for a pipe."""
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-    except (OSError, ValueError) as error:
-        raise YamlFileError(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    try:
-        found = os.fstat(descriptor)
-        if stat.S_ISDIR(found.st_mode):
-            raise YamlFileError("cannot be read: Is a directory")
-        if not stat.S_ISREG(found.st_mode):
-            raise YamlFileError("cannot be read: it must be a regular file, no pipe, socket or device")
-        if found.st_size > LARGEST_BYTES:
-            raise YamlFileError(f"cannot be read: it must have at most {LARGEST_BYTES} bytes: got {found.st_size}")
-        with os.fdopen(descriptor, "rb", closefd=False) as file:
-            data = file.read(LARGEST_BYTES + 1)
-    finally:
-        os.close(descriptor)
-    try:
-        return data.decode("utf-8")
+        return read_regular_file(path, LARGEST_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise YamlFileError(f"is not YAML: it must be text in UTF-8 ({error.reason} at byte {error.start})") from error
+    except FileError as error:
+        raise YamlFileError(str(error)) from error
 
 
 def read_yaml(path: str | Path) -> Any:
@@ -51,9 +38,14 @@ def parse_yaml(text: str) -> Any:
     try:
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
-        raise YamlFileError(f"is not YAML: {' '.join(str(error).split())}") from error
+        raise YamlFileError(f"is not YAML: {_line(error)}") from error
     except (ValueError, OverflowError, RecursionError) as error:
-        raise YamlFileError(f"is not YAML: a value cannot be read: {' '.join(str(error).split())}") from error
+        raise YamlFileError(f"is not YAML: a value cannot be read: {_line(error)}") from error
+
+
+def _line(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return "".join(character if character.isprintable() else ascii(character)[1:-1] for character in text)
 
 
 class _Loader(yaml.SafeLoader):
@@ -93,4 +85,10 @@ class _Loader(yaml.SafeLoader):
         return int(self.construct_yaml_int(node))
 
 
+# YAML 1.1 has no 3e-04 without a point and 1e5 without a sign; YAML 1.2, rcl and every user have.
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+\Z"),
+    list("-+.0123456789"),
+)
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_limited_int)
