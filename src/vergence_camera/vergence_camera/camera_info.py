@@ -16,7 +16,6 @@ from vergence_rig.parameters import shown
 from vergence_rig.regular_file import expanded
 from vergence_rig.yaml_file import YamlFileError, read_yaml
 
-DISTORTION_LENGTHS = {"plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14), "equidistant": (4,)}
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -47,16 +46,6 @@ class Calibration:
             raise CameraCalibrationError(f"image size must be at least 1x1: got {self.width_px}x{self.height_px}")
         if not (self.k[0] > 0.0 and self.k[4] > 0.0):
             raise CameraCalibrationError(f"focal lengths must be above 0: got {self.k[0]:g}, {self.k[4]:g}")
-        lengths = DISTORTION_LENGTHS.get(self.distortion_model)
-        if lengths is None:
-            known = ", ".join(DISTORTION_LENGTHS)
-            raise CameraCalibrationError(f"distortion_model must be one of {known}: got {self.distortion_model!r}")
-        if len(self.d) not in lengths or not all(math.isfinite(value) for value in self.d):
-            allowed = " or ".join(map(str, lengths))
-            raise CameraCalibrationError(
-                f"distortion_coefficients must be {allowed} finite numbers: got {list(self.d)}"
-            )
-
         try:
             check_camera(
                 self.width_px,
