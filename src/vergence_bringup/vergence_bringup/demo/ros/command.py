@@ -24,7 +24,8 @@ from vergence_bringup.node_table import PHOTOGRAPHED
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir, environment
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
-from vergence_rig.rig import Rig, load_rig
+from vergence_rig.rig import Rig
+from vergence_rig.rig_file import load_rig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
