@@ -224,7 +224,7 @@ class Rig:
         )
 
     def in_eye_angles(self) -> "Rig":
-        """Return the same head with its eye angles as joints: limits, speeds and servos in them, no zero, scale or yaw."""
+        """Return the same head with its eye angles as joints: limits, speeds, servos in them; no zero, scale, yaw."""
         lower = self.eye_angles([joint.lower_rad for _, joint in self.joints.items()])
         upper = self.eye_angles([joint.upper_rad for _, joint in self.joints.items()])
         joints = (
