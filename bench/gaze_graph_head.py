@@ -19,7 +19,8 @@ from vergence_common.domains import own_domain
 from vergence_common.stamps import to_seconds
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence
-from vergence_rig.rig import JOINT_NAMES, Rig, load_rig
+from vergence_rig.rig import JOINT_NAMES, Rig
+from vergence_rig.rig_file import load_rig
 
 Array = npt.NDArray[np.float64]
 Point = Sequence[float] | Array

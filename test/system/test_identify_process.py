@@ -18,7 +18,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup
-from vergence_rig.rig import load_rig
+from vergence_rig.rig_file import load_rig
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(400), pytest.mark.usefixtures("opengl")]
 

@@ -30,7 +30,8 @@ from vergence_gaze.goals.goal import Goal, GoalKind
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_rig.camera import CameraModel
-from vergence_rig.rig import JOINT_NAMES, CameraSpec, Rig, default_rig, load_rig
+from vergence_rig.rig import JOINT_NAMES, CameraSpec, Rig, default_rig
+from vergence_rig.rig_file import load_rig
 from vergence_rig.servo import MG995, SG90, ServoPlant
 
 DEG = math.pi / 180

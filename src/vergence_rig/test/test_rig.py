@@ -5,16 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from vergence_rig.rig import (
-    JOINT_NAMES,
-    JointSpec,
-    Rig,
-    RigError,
-    default_rig,
-    load_rig,
-    rig_as_mapping,
-    rig_from_mapping,
-)
+from vergence_rig.rig import JOINT_NAMES, JointSpec, Rig, RigError, default_rig
+from vergence_rig.rig_file import load_rig, rig_as_mapping, rig_from_mapping
 from vergence_rig.servo import IDEAL, MG995, SG90
 
 CONFIG = Path(__file__).resolve().parents[3] / "config" / "rig.yaml"

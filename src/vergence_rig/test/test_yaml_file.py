@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from vergence_rig.rig import RigError, default_rig, load_rig
+from vergence_rig.rig import RigError, default_rig
+from vergence_rig.rig_file import load_rig
 from vergence_rig.yaml_file import YamlFileError, parse_yaml, read_yaml
 
 HOSTILE = {

@@ -71,6 +71,16 @@ class CameraModel:
         polynomial = self.distortion_model != "equidistant" and not np.any(coefficients[5:8])
         self._limit = _monotone_limit(coefficients) if polynomial else np.inf
 
+    def equals(self, other: "CameraModel") -> bool:
+        """Return whether another model maps every pixel alike."""
+        mine, others = ((m.width_px, m.height_px, m.fx_px, m.fy_px, m.cx_px, m.cy_px) for m in (self, other))
+        if mine != others or self._is_distorted != other._is_distorted:
+            return False
+        if not self._is_distorted:
+            return True
+        same = self.distortion_model == other.distortion_model and self.distortion.size == other.distortion.size
+        return same and bool((self.distortion == other.distortion).all())
+
     def undistort(self, uv: Any) -> Array:
         """Return normalised coordinates (N, 2), x/z and y/z, of raw pixels (N, 2); NaN where none exist."""
         pixels = np.atleast_2d(np.asarray(uv, dtype=np.float64))

@@ -4,16 +4,12 @@ Every part is a frozen dataclass that validates itself; errors name the key, wha
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 from vergence_rig.camera_limits import COEFFICIENTS, CameraLimitError, check_camera
 from vergence_rig.parameters import ParameterError, Parameters, parameter, shown
-from vergence_rig.servo import MG995, PRESETS, SG90, ServoSpec
-from vergence_rig.spelling import spelling_hint
-from vergence_rig.yaml_file import YamlFileError, read_yaml
+from vergence_rig.servo import MG995, SG90, ServoSpec
 
 JOINT_NAMES = ("pan_left", "pan_right", "tilt")
 """The three joints, in the order that commands carry them."""
@@ -62,21 +58,59 @@ class CameraSpec(Parameters):
 
 
 @dataclass(frozen=True)
+class EyeMount(Parameters):
+    """Where one eye's pan axis stands on the tilt bar, and its lens in the frame that the pan axis turns.
+
+    The pan axis crosses `rig_base` at zero tilt at (axis_x_m, +-baseline_m / 2, axis_z_m). The pan frame has x forward,
+    y left, z up at pan 0, its origin on the axis; the lens is the camera's optical centre. The camera is turned by
+    roll, then pitch, then yaw about the fixed axes of the pan frame: roll > 0 lowers its right side, pitch > 0 looks
+    down, yaw > 0 looks left.
+    """
+
+    axis_x_m: float = parameter(0.0, "pan axis, forward of rig_base", unit="m", minimum=-1, maximum=1)
+    axis_z_m: float = parameter(0.0, "height above rig_base where the pan axis is", unit="m", minimum=-1, maximum=1)
+    lens_x_m: float = parameter(0.0, "lens, forward of its pan axis", unit="m", minimum=-1, maximum=1)
+    lens_y_m: float = parameter(0.0, "lens, left of its pan axis", unit="m", minimum=-1, maximum=1)
+    lens_z_m: float = parameter(0.0, "lens, above the pan frame's origin", unit="m", minimum=-1, maximum=1)
+    roll_rad: float = parameter(
+        0.0, "roll of the camera, > 0 lowers its right side", unit="rad", minimum=-0.5, maximum=0.5
+    )
+    pitch_rad: float = parameter(0.0, "pitch of the camera, > 0 looks down", unit="rad", minimum=-0.5, maximum=0.5)
+    yaw_rad: float = parameter(0.0, "yaw of the camera, > 0 looks left", unit="rad", minimum=-0.5, maximum=0.5)
+
+
+@dataclass(frozen=True)
 class JointSpec:
-    """One joint: its limits, the largest commanded speed, and its servo."""
+    """One joint: its limits, the largest commanded speed, its servo, and how far its axis turns.
+
+    Limits and speed are the joint's own, as joint_states and commands carry them. The axis stands at
+    `zero_rad + scale * joint`: a horn sits a few degrees off, a servo turns a few per cent more than it is commanded.
+    """
 
     lower_rad: float
     upper_rad: float
     max_speed_rad_s: float
     servo: ServoSpec
+    zero_rad: float = 0.0
+    scale: float = 1.0
 
     def __post_init__(self) -> None:
+        _check_number("zero_rad", self.zero_rad, -0.5, 0.5, "rad")
+        _check_number("scale", self.scale, 0.5, 2.0, "1")
         half_turn = math.pi
         _check_number("lower_rad", self.lower_rad, -half_turn, half_turn, "rad")
         _check_number("upper_rad", self.upper_rad, -half_turn, half_turn, "rad")
         _check_number("max_speed_rad_s", self.max_speed_rad_s, 1e-3, 1e3, "rad/s")
         if self.lower_rad >= self.upper_rad:
             raise RigError(f"upper_rad must be more than lower_rad, {self.lower_rad!r} [rad]: got {self.upper_rad!r}")
+
+    def axis_rad(self, joint_rad: float) -> float:
+        """Return the angle of the axis [rad] at an angle of the joint [rad]."""
+        return self.zero_rad + self.scale * joint_rad
+
+    def joint_rad(self, axis_rad: float) -> float:
+        """Return the joint's angle [rad] at which the axis stands at an angle [rad]; the inverse of `axis_rad`."""
+        return (axis_rad - self.zero_rad) / self.scale
 
     def clamp(self, angle_rad: float) -> float:
         """Return the angle [rad] held within the joint's limits."""
@@ -117,16 +151,25 @@ class Joints:
 
 @dataclass(frozen=True)
 class Rig:
-    """A binocular head: eyes at +-baseline_m / 2 on the y axis of `rig_base`, on top of one tilt bar."""
+    """A binocular head: pan axes at y = +-baseline_m / 2 of `rig_base`, on top of one bar that tilts about y.
+
+    The tilt axis passes (tilt_axis_x_m, 0, tilt_axis_z_m).
+    """
 
     baseline_m: float = 0.065
     left_camera: CameraSpec = field(default_factory=CameraSpec)
     right_camera: CameraSpec = field(default_factory=CameraSpec)
     joints: Joints = field(default_factory=Joints)
     minimum_vergence_rad: float = 0.0
+    left_mount: EyeMount = field(default_factory=EyeMount)
+    right_mount: EyeMount = field(default_factory=EyeMount)
+    tilt_axis_x_m: float = 0.0
+    tilt_axis_z_m: float = 0.0
 
     def __post_init__(self) -> None:
         _check_number("baseline_m", self.baseline_m, 1e-3, 10.0, "m")
+        _check_number("tilt_axis_x_m", self.tilt_axis_x_m, -1.0, 1.0, "m")
+        _check_number("tilt_axis_z_m", self.tilt_axis_z_m, -1.0, 1.0, "m")
         _check_number("minimum_vergence_rad", self.minimum_vergence_rad, 0.0, 0.5 * math.pi, "rad")
         widest_rad = self.pan_right.upper_rad - self.pan_left.lower_rad
         if self.minimum_vergence_rad >= widest_rad:
@@ -150,134 +193,83 @@ class Rig:
         """The joint of the bar that carries both eyes."""
         return self.joints.tilt
 
+    @property
+    def mean_pitch_rad(self) -> float:
+        """Mean pitch of both cameras on their pan axes [rad]."""
+        return 0.5 * (self.left_mount.pitch_rad + self.right_mount.pitch_rad)
+
+    def mount(self, left: bool) -> EyeMount:
+        """Return one eye's mount."""
+        return self.left_mount if left else self.right_mount
+
+    def camera(self, left: bool) -> CameraSpec:
+        """Return one eye's camera."""
+        return self.left_camera if left else self.right_camera
+
+    def eye_angles(self, joints_rad: Sequence[float]) -> tuple[float, float, float]:
+        """Return pan_left, pan_right and tilt of the optical axes [rad] at angles of the joints (as JOINT_NAMES).
+
+        A pan is its axis's angle and the camera's yaw together. Without zeros, scales and yaws they are the joints'.
+        """
+        left, right, tilt = joints_rad
+        return (
+            self.pan_left.axis_rad(left) + self.left_mount.yaw_rad,
+            self.pan_right.axis_rad(right) + self.right_mount.yaw_rad,
+            self.tilt.axis_rad(tilt),
+        )
+
+    def joint_angles(self, eyes_rad: Sequence[float]) -> tuple[float, float, float]:
+        """Return the angles of the joints [rad] at angles of the optical axes; the inverse of `eye_angles`."""
+        left, right, tilt = eyes_rad
+        return (
+            self.pan_left.joint_rad(left - self.left_mount.yaw_rad),
+            self.pan_right.joint_rad(right - self.right_mount.yaw_rad),
+            self.tilt.joint_rad(tilt),
+        )
+
+    def in_eye_angles(self) -> "Rig":
+        """Return the same head with its eye angles as joints: limits, speeds, servos in them; no zero, scale, yaw."""
+        lower = self.eye_angles([joint.lower_rad for _, joint in self.joints.items()])
+        upper = self.eye_angles([joint.upper_rad for _, joint in self.joints.items()])
+        joints = (
+            replace(
+                joint,
+                lower_rad=low,
+                upper_rad=high,
+                max_speed_rad_s=joint.scale * joint.max_speed_rad_s,
+                servo=joint.servo.scaled(joint.scale),
+                zero_rad=0.0,
+                scale=1.0,
+            )
+            for (_, joint), low, high in zip(self.joints.items(), lower, upper, strict=True)
+        )
+        mounts = (_without_yaw(self.left_mount), _without_yaw(self.right_mount))
+        return replace(self, joints=Joints(*joints), left_mount=mounts[0], right_mount=mounts[1])
+
     def with_servos(self, pan: ServoSpec, tilt: ServoSpec | None = None) -> "Rig":
         """Return the same rig with other servos (`tilt`: the pans' if not given) and speed limits to match."""
         tilt = pan if tilt is None else tilt
-        return Rig(
-            self.baseline_m,
-            self.left_camera,
-            self.right_camera,
-            Joints(
+        return replace(
+            self,
+            joints=Joints(
                 *(
-                    JointSpec(joint.lower_rad, joint.upper_rad, servo.speed_rad_s, servo)
+                    replace(joint, max_speed_rad_s=servo.speed_rad_s, servo=servo)
                     for joint, servo in ((self.pan_left, pan), (self.pan_right, pan), (self.tilt, tilt))
                 )
             ),
-            self.minimum_vergence_rad,
         )
+
+
+def _without_yaw(mount: EyeMount) -> EyeMount:
+    """Return the mount in a pan frame that is turned with the camera."""
+    cos, sin = math.cos(mount.yaw_rad), math.sin(mount.yaw_rad)
+    x_m, y_m = mount.lens_x_m, mount.lens_y_m
+    return replace(mount, lens_x_m=cos * x_m + sin * y_m, lens_y_m=cos * y_m - sin * x_m, yaw_rad=0.0)
 
 
 def default_rig() -> Rig:
     """Return the built-in rig, equal to config/rig.yaml."""
     return Rig()
-
-
-def load_rig(path: str | Path) -> Rig:
-    """Read a rig from YAML; "" gives the built-in one. Raises RigError."""
-    if str(path) == "":
-        return default_rig()
-    try:
-        document = read_yaml(path)
-    except YamlFileError as error:
-        raise RigError(f"rig file '{path}' {error}") from error
-    try:
-        return rig_from_mapping(document)
-    except RigError as error:
-        raise RigError(f"rig file '{path}': {error}") from error
-
-
-def rig_from_mapping(document: Any) -> Rig:
-    """Build a rig from nested mappings as in rig.yaml; what is left out keeps its default. Raises RigError.
-
-    The key `identified` is the record written by `vergence identify`; it is ignored here.
-    """
-    keys = ("baseline_m", "left_camera", "right_camera", "joints", "minimum_vergence_rad", "identified")
-    top = _mapping("rig", document, keys)
-    joints = _mapping("joints", top.get("joints", {}), JOINT_NAMES)
-    default = default_rig()
-    return Rig(
-        baseline_m=_number(top, "baseline_m", default.baseline_m),
-        left_camera=_parameters("left_camera", CameraSpec(), top.get("left_camera", {})),
-        right_camera=_parameters("right_camera", CameraSpec(), top.get("right_camera", {})),
-        joints=Joints(*(_joint(f"joints.{name}", default.joints[name], joints.get(name, {})) for name in JOINT_NAMES)),
-        minimum_vergence_rad=_number(top, "minimum_vergence_rad", default.minimum_vergence_rad),
-    )
-
-
-def rig_as_mapping(rig: Rig) -> dict[str, Any]:
-    """Return a rig as nested mappings for rig.yaml: the inverse of `rig_from_mapping`, with every key."""
-    return {
-        "baseline_m": rig.baseline_m,
-        "left_camera": _entries(rig.left_camera),
-        "right_camera": _entries(rig.right_camera),
-        "joints": {
-            name: {
-                "lower_rad": joint.lower_rad,
-                "upper_rad": joint.upper_rad,
-                "max_speed_rad_s": joint.max_speed_rad_s,
-                "servo": joint.servo.name if PRESETS.get(joint.servo.name) == joint.servo else _entries(joint.servo),
-            }
-            for name, joint in rig.joints.items()
-        },
-        "minimum_vergence_rad": rig.minimum_vergence_rad,
-    }
-
-
-def _entries(parameters: Parameters) -> dict[str, Any]:
-    values = {spec.name: getattr(parameters, spec.name) for spec in parameters.specs()}
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
-
-
-def _joint(key: str, default: JointSpec, value: Any) -> JointSpec:
-    entries = _mapping(key, value, ("lower_rad", "upper_rad", "max_speed_rad_s", "servo"))
-    try:
-        return JointSpec(
-            _number(entries, "lower_rad", default.lower_rad),
-            _number(entries, "upper_rad", default.upper_rad),
-            _number(entries, "max_speed_rad_s", default.max_speed_rad_s),
-            _servo(entries.get("servo", default.servo)),
-        )
-    except RigError as error:
-        raise RigError(f"{key}.{error}") from error
-
-
-def _servo(value: Any) -> ServoSpec:
-    if isinstance(value, ServoSpec):
-        return value
-    if isinstance(value, str):
-        if value not in PRESETS:
-            known = ", ".join(repr(name) for name in PRESETS)
-            raise RigError(f"servo must be one of {known}, or a mapping of its parameters: got {shown(value)}")
-        return PRESETS[value]
-    return _parameters("servo", ServoSpec(), value)
-
-
-Spec = TypeVar("Spec", bound=Parameters)
-
-
-def _parameters(key: str, default: Spec, value: Any) -> Spec:
-    entries = _mapping(key, value, tuple(spec.name for spec in default.specs()))
-    try:
-        return default.replaced(**entries)
-    except ParameterError as error:
-        raise RigError(f"{key}.{error.name} must be {error.allowed}: got {shown(error.value)}{error.advice}") from error
-
-
-def _mapping(key: str, value: Any, allowed: tuple[str, ...]) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise RigError(f"{key} must be a mapping with any of {', '.join(allowed)}: got {shown(value)}")
-    for name in value:
-        if name not in allowed:
-            raise RigError(f"{key} must have no keys but {', '.join(allowed)}: got {shown(name)}")
-    return value
-
-
-def _number(entries: Mapping[str, Any], key: str, default: float) -> float:
-    value = entries.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        hint = spelling_hint(float, False, None, value).replace("NAME", key)
-        raise RigError(f"{key} must be a number: got {shown(value)}{hint and f'; {hint}'}")
-    return float(value)
 
 
 def _check_number(key: str, value: float, minimum: float, maximum: float, unit: str) -> None:

@@ -41,6 +41,15 @@ class ServoSpec(Parameters):
         """Largest deviation of the shaft from its commanded angle at rest [rad]."""
         return 0.5 * (self.dead_band_rad + self.backlash_rad + self.pulse_step_rad)
 
+    def scaled(self, scale: float) -> "ServoSpec":
+        """Return the servo with its angles in another unit: all that are angles times `scale`."""
+        return self.replaced(
+            speed_rad_s=scale * self.speed_rad_s,
+            dead_band_rad=scale * self.dead_band_rad,
+            pulse_step_rad=scale * self.pulse_step_rad,
+            backlash_rad=scale * self.backlash_rad,
+        )
+
 
 SG90 = ServoSpec(
     name="sg90",

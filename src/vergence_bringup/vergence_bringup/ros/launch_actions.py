@@ -27,7 +27,7 @@ from vergence_bringup.launching.arguments import ARGUMENTS, problems, unknown
 from vergence_bringup.launching.endings import ending
 from vergence_bringup.launching.head_urdf import head_urdf
 from vergence_bringup.node_table import HOSTS, NODES
-from vergence_rig.rig import load_rig
+from vergence_rig.rig_file import load_rig
 
 Build = Callable[[Mapping[str, str]], list[Any]]
 Check = Callable[[Mapping[str, str]], list[str]]

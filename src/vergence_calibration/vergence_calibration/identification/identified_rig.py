@@ -11,7 +11,8 @@ from vergence_calibration.identification.identification import Identification
 from vergence_calibration.identification.latencies import Estimate
 from vergence_calibration.identification.wiring_faults import cross_talk
 from vergence_rig.parameters import ParameterError
-from vergence_rig.rig import CameraSpec, Joints, JointSpec, Rig, rig_as_mapping, rig_from_mapping
+from vergence_rig.rig import CameraSpec, Joints, JointSpec, Rig
+from vergence_rig.rig_file import rig_as_mapping, rig_from_mapping
 
 _HEAD = "# Written by vergence identify; the old file is kept beside it. Keys: config/rig.yaml, docs/identify.md\n"
 _NODES_HEAD = "# Written by vergence identify, for --params-file after the shipped ones: docs/identify.md\n"

@@ -19,7 +19,7 @@ from vergence_calibration.servos import servo_file
 from vergence_calibration.servos.jog_session import JogSession
 from vergence_calibration.servos.terminal import NoTerminalError, Terminal
 from vergence_rig.regular_file import expanded
-from vergence_rig.rig import load_rig
+from vergence_rig.rig_file import load_rig
 from vergence_servo.calibration import ServoCalibration, ServoCalibrationError, default_servos, load_servos
 from vergence_servo.driver_set import DriverSet, backends_of
 from vergence_servo.drivers.protocol import DriverIoError, ServoDriver

@@ -16,7 +16,8 @@ from vergence_calibration.identification.node_parameters import node_parameters
 from vergence_calibration.ros.identified_head import TRANSPORTS, IdentifiedHead
 from vergence_calibration.ros.running_head import HeadError
 from vergence_rig.regular_file import expanded
-from vergence_rig.rig import JOINT_NAMES, load_rig
+from vergence_rig.rig import JOINT_NAMES
+from vergence_rig.rig_file import load_rig
 
 _REFUSED, _BAD_INPUT = 1, 2
 

@@ -32,7 +32,7 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import from_nanoseconds
-from vergence_rig.rig import load_rig
+from vergence_rig.rig_file import load_rig
 
 
 class CameraNode(Node):

@@ -35,7 +35,7 @@ from vergence_msgs.msg import (
     TrackRequest,
 )
 from vergence_rig.camera import CameraModel, CameraModelError
-from vergence_rig.rig import load_rig
+from vergence_rig.rig_file import load_rig
 
 _FEEDBACK_EVERY = 10
 _MARKERS_EVERY = 10

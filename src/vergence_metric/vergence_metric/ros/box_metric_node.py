@@ -35,7 +35,7 @@ from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
 from vergence_msgs.msg import BoxVergence, StereoDetections
 from vergence_rig.parameters import ParameterError
-from vergence_rig.rig import load_rig
+from vergence_rig.rig_file import load_rig
 
 EYES = ("left", "right")
 

@@ -29,7 +29,7 @@ from vergence_metric.ros.stereo_input import ImagePair, StereoInput
 from vergence_metric.ros.track_messages import track_message, track_request, unusable_track_message
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
-from vergence_rig.rig import load_rig
+from vergence_rig.rig_file import load_rig
 
 _JOINT_SAMPLES_NS = 500_000_000  # longer than two pairs can be apart while the tracker still follows
 

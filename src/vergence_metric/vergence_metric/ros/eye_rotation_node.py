@@ -25,7 +25,7 @@ from vergence_metric.ros.eye_rotation_messages import eye_rotation_message
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import ImagePair, StereoInput
 from vergence_msgs.msg import EyeRotation
-from vergence_rig.rig import load_rig
+from vergence_rig.rig_file import load_rig
 
 
 class EyeRotationNode(MetricNode):

@@ -20,7 +20,8 @@ from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_nanoseconds
 from vergence_rig.regular_file import expanded
-from vergence_rig.rig import JOINT_NAMES, load_rig
+from vergence_rig.rig import JOINT_NAMES
+from vergence_rig.rig_file import load_rig
 from vergence_servo.calibration import load_servos, servo_limits
 from vergence_servo.command_guard import (
     CommandRefusedError,

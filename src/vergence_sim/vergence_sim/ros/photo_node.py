@@ -13,7 +13,8 @@ from vergence_common.parameters import ParameterSet
 from vergence_msgs.msg import TrueVergence
 from vergence_rig.geometry import GeometryError, eye_direction, point_at
 from vergence_rig.parameters import ParameterError
-from vergence_rig.rig import CameraSpec, load_rig
+from vergence_rig.rig import CameraSpec
+from vergence_rig.rig_file import load_rig
 from vergence_rig.servo import IDEAL
 from vergence_sim.camera_parameters import CameraParameters, LeftCameraParameters, RightCameraParameters
 from vergence_sim.parameters import SimParameters

@@ -9,7 +9,7 @@ from geometry_msgs.msg import PointStamped
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet
 from vergence_msgs.msg import TrueBoxes, TrueVergence
-from vergence_rig.rig import load_rig
+from vergence_rig.rig_file import load_rig
 from vergence_sim.parameters import GROUPS, NODE_GROUPS, SimParameters
 from vergence_sim.ros.real_time_node import RealTimeNode
 from vergence_sim.ros.sim_messages import true_boxes, true_vergence

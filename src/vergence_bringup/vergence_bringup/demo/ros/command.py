@@ -25,7 +25,8 @@ from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
 from vergence_rig.regular_file import expanded
-from vergence_rig.rig import Rig, load_rig
+from vergence_rig.rig import Rig
+from vergence_rig.rig_file import load_rig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
