@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.picture_size import KINDS, picture_size
+from vergence_rig.printed import printed_line
 from vergence_rig.regular_file import FileError, read_regular_file
 
 LARGEST_PIXELS = 64_000_000
@@ -44,7 +45,8 @@ def decode_picture(data: bytes | memoryview | npt.NDArray[np.uint8], flags: int 
     try:
         pixels = cv2.imdecode(raw, flags)
     except cv2.error as error:
-        raise FileError(f"is a picture of {width}x{height} px that cannot be decoded: {_line(error)}") from error
+        reason = printed_line(getattr(error, "err", "") or error)
+        raise FileError(f"is a picture of {width}x{height} px that cannot be decoded: {reason}") from error
     if pixels is None:
         raise FileError(f"is a picture of {width}x{height} px that cannot be decoded ({len(raw)} bytes)")
     return np.asarray(pixels, np.uint8)
@@ -55,7 +57,3 @@ def check_size(width_px: int, height_px: int) -> None:
     if not 0 < width_px * height_px <= LARGEST_PIXELS:
         most = LARGEST_PIXELS // 1_000_000
         raise FileError(f"is too large a picture: it must have 1 to {most} million px: got {width_px}x{height_px} px")
-
-
-def _line(error: cv2.error) -> str:
-    return " ".join(str(getattr(error, "err", "") or error).split())

@@ -40,7 +40,7 @@ def _meant(kind: type, choices: tuple[str, ...] | None, value: Any) -> str | Non
         if isinstance(value, bool):
             words = [word for word in _WORDS[value] if choices is None or word in choices]
             return words[0] if words else None
-        return str(value) if choices is None and isinstance(value, (int, float)) else None
+        return str(value) if choices is None and isinstance(value, int) else None
     if kind is int and type(value) is float and value.is_integer() and abs(value) < 1e15:
         return str(int(value))
     if not isinstance(value, str):

@@ -7,6 +7,7 @@ from typing import Any
 
 import yaml
 
+from vergence_rig.printed import printed_line
 from vergence_rig.regular_file import FileError, read_regular_file
 
 LARGEST_BYTES = 1_000_000
@@ -38,14 +39,9 @@ def parse_yaml(text: str) -> Any:
     try:
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
-        raise YamlFileError(f"is not YAML: {_line(error)}") from error
-    except (ValueError, OverflowError, RecursionError) as error:
-        raise YamlFileError(f"is not YAML: a value cannot be read: {_line(error)}") from error
-
-
-def _line(error: Exception) -> str:
-    text = " ".join(str(error).split())
-    return "".join(character if character.isprintable() else ascii(character)[1:-1] for character in text)
+        raise YamlFileError(f"is not YAML: {printed_line(error)}") from error
+    except Exception as error:  # PyYAML lets through what its constructors raise, an AttributeError for a date
+        raise YamlFileError(f"is not YAML: a value cannot be read: {printed_line(error)}") from error
 
 
 class _Loader(yaml.SafeLoader):
@@ -78,17 +74,32 @@ class _Loader(yaml.SafeLoader):
                 seen.add(key)
         return dict(super().construct_mapping(node, deep=deep))
 
+    def construct_scalar(self, node: Any) -> Any:
+        value = super().construct_scalar(node)
+        if isinstance(value, str) and any("\ud800" <= character <= "\udfff" for character in value):
+            text = "a text must be of Unicode characters: got half a surrogate pair"
+            raise yaml.MarkedYAMLError(None, None, text, node.start_mark)
+        return value
+
     def construct_limited_int(self, node: Any) -> int:
         if len(node.value) > LONGEST_INTEGER:
             text = f"a whole number must have at most {LONGEST_INTEGER} digits: got {len(node.value)}"
             raise yaml.MarkedYAMLError(None, None, text, node.start_mark)
-        return int(self.construct_yaml_int(node))
+        return int(node.value, 10 if node.value.lstrip("-+")[:2].isdigit() else 0)
 
 
-# YAML 1.1 has no 3e-04 without a point and 1e5 without a sign; YAML 1.2, rcl and every user have.
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+\Z"),
-    list("-+.0123456789"),
-)
+# Numbers as in YAML 1.2 and in rcl: YAML 1.1 has no 3e-04 without a point, and takes the serial number 0123 for 83,
+# and 12:30 for 750.
+_LIKE_NUMBERS = frozenset(f"tag:yaml.org,2002:{kind}" for kind in ("int", "float"))
+_NUMBERS = {
+    "int": r"[-+]?(?:0|[1-9][0-9]*|0x[0-9a-fA-F]+|0o[0-7]+|0b[01]+)\Z",
+    "float": r"(?:[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[-+]?[0-9]+[eE][-+]?[0-9]+"
+    r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z",
+}
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _LIKE_NUMBERS]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _kind, _pattern in _NUMBERS.items():
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(_pattern), list("-+.0123456789"))
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_limited_int)

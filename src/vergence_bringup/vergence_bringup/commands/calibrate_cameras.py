@@ -14,6 +14,7 @@ from vergence_camera.calibration.report import intrinsics_text, pose_text, write
 from vergence_camera.calibration.solve import Intrinsics, SolveError, StereoPose, check_sides, solve_camera, solve_pair
 from vergence_camera.calibration.views import EYES, Verdict, ViewCollector
 from vergence_rig.picture_file import Pixels, read_picture
+from vergence_rig.printed import printed_line
 from vergence_rig.regular_file import FileError, expanded
 
 Say = Callable[[str], None]
@@ -76,7 +77,7 @@ def run(args: argparse.Namespace, say: Say = print) -> int:
         for path in write_results(args.out, cameras, pose, board_values):
             say(f"wrote {path}")
     except (BoardError, SolveError, OSError) as error:
-        print(f"vergence calibrate cameras: {error}", file=sys.stderr)
+        print(f"vergence calibrate cameras: {printed_line(error)}", file=sys.stderr)
         return 2
     return 0
 
