@@ -1,5 +1,6 @@
 """edge_metric_node: pairs of images in, metric I, the signed error of the fovea and the followed target out."""
 
+import math
 from collections.abc import Sequence
 from time import monotonic_ns
 from typing import Any
@@ -20,6 +21,7 @@ from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.measurement.overlay import draw_overlay
 from vergence_metric.measurement.pair_measurement import Models, PairMeasurement
 from vergence_metric.measurement.parameters import GROUPS, PairMeasurementParameters, VergedParameters
+from vergence_metric.pairs.eye_order import EyeOrderMonitor
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.pairs.picture_faults import PictureMonitor
@@ -43,7 +45,7 @@ class EdgeMetricNode(MetricNode):
         stereo = self._settings.get(StereoParameters)
         limit_threads(stereo.threads)
         self._measurement = PairMeasurement(_measurement_parameters(self._settings), load_rig(stereo.rig))
-        self._pictures = PictureMonitor()
+        self._pictures, self._order = PictureMonitor(), EyeOrderMonitor()
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
         self._edge_publisher = self._output(qos, EdgeVergence, "vergence/edge")
@@ -77,6 +79,8 @@ class EdgeMetricNode(MetricNode):
             self._publish_unusable(fault.reason, header, skew_s)
             return
         models = self._stereo.models_for(pair.left.pixels)
+        with self._times.measure("pictures"):
+            self._update_order(pair, models)
         with self._times.measure("metric"):
             edge = self._measurement.edge(pair.left.pixels, pair.right.pixels)
         if self._edge_publisher.get_subscription_count() or self._error_publisher.get_subscription_count():
@@ -91,6 +95,13 @@ class EdgeMetricNode(MetricNode):
                 self._overlay_publisher.publish(array_to_image(picture, header))
         self._measurement.update_alignment()
         self._failure = None
+
+    def _update_order(self, pair: ImagePair, models: Models | None) -> None:
+        eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
+        vergence_rad = math.nan if eyes is None else eyes.vergence_rad
+        focal_px = math.nan if models is None else models[0].fx_px
+        stamp_s = pair.left_stamp_ns * 1e-9
+        self._order.update(stamp_s, pair.left.pixels, pair.right.pixels, vergence_rad, focal_px)
 
     def _publish_unusable(self, reason: str, header: Header, pair_skew_s: float) -> None:
         estimator = self._settings.get(DisparityParameters).estimator
@@ -129,6 +140,8 @@ class EdgeMetricNode(MetricNode):
 
     def _report_pictures(self) -> Report:
         fault = self._pictures.fault
+        if fault is None and self._order.fault:
+            return Report(ERROR, self._order.fault)
         if fault is None:
             return Report(OK, "the pictures are neither frozen, nor the same in both eyes, nor black or white")
         return Report(ERROR, f"{fault.reason}{'; nothing is measured' if fault.unusable else ''}")
