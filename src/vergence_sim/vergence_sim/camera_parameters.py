@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from vergence_rig.parameters import Parameters, parameter
+from vergence_rig.camera_limits import COEFFICIENTS
+from vergence_rig.parameters import ParameterError, Parameters, parameter
 
 
 @dataclass(frozen=True)
@@ -48,12 +49,18 @@ class CameraParameters(Parameters):
     )
     distortion: tuple[float, ...] = parameter(
         (-0.04, 0.02, 0.0, 0.0, 0.0),
-        "distortion coefficients k1 k2 p1 p2 k3 of both lenses",
+        "distortion coefficients of both lenses in OpenCV's order, k1 k2 p1 p2 k3 ...",
         minimum=-1,
         maximum=1,
         read_only=True,
         formerly="distortion",
     )
+
+    def check(self) -> None:
+        """See Parameters."""
+        counts = COEFFICIENTS["plumb_bob"]
+        if len(self.distortion) not in counts:
+            raise ParameterError("distortion", self.distortion, f"a list of {', '.join(map(str, counts))} numbers")
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from vergence_calibration.identification.latencies import ASSUMPTIONS, Estimate
 from vergence_calibration.identification.node_parameters import node_parameters
 from vergence_calibration.ros.identified_head import TRANSPORTS, IdentifiedHead
 from vergence_calibration.ros.running_head import HeadError
+from vergence_rig.regular_file import expanded
 from vergence_rig.rig import JOINT_NAMES
 from vergence_rig.rig_file import load_rig
 
@@ -24,7 +25,9 @@ _REFUSED, _BAD_INPUT = 1, 2
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of `vergence identify`."""
     parser.add_argument("--rig", default="", help="rig.yaml of the head (default: the built-in rig)")
-    parser.add_argument("--out", type=Path, help="rig.yaml to write (default: that of --rig, else rig_identified.yaml)")
+    parser.add_argument(
+        "--out", type=expanded, help="rig.yaml to write (default: that of --rig, else rig_identified.yaml)"
+    )
     parser.add_argument(
         "--axes", nargs="+", choices=JOINT_NAMES, default=list(JOINT_NAMES), help="axes to identify (default: all)"
     )
