@@ -207,12 +207,13 @@ class Rig:
 
         A pan is its axis's angle and the camera's yaw together. Without zeros, scales and yaws they are the joints'.
         """
-        left, right, tilt = joints_rad
-        return (
-            self.pan_left.axis_rad(left) + self.left_mount.yaw_rad,
-            self.pan_right.axis_rad(right) + self.right_mount.yaw_rad,
-            self.tilt.axis_rad(tilt),
-        )
+        left, right, tilt = (self.eye_angle(name, rad) for name, rad in zip(JOINT_NAMES, joints_rad, strict=True))
+        return left, right, tilt
+
+    def eye_angle(self, name: str, joint_rad: float) -> float:
+        """Return the angle of one joint's optical axis [rad], as `eye_angles`."""
+        yaws_rad = {"pan_left": self.left_mount.yaw_rad, "pan_right": self.right_mount.yaw_rad}
+        return self.joints[name].axis_rad(joint_rad) + yaws_rad.get(name, 0.0)
 
     def joint_angles(self, eyes_rad: Sequence[float]) -> tuple[float, float, float]:
         """Return the angles of the joints [rad] at angles of the optical axes; the inverse of `eye_angles`."""
