@@ -24,8 +24,10 @@ from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.ros import gaze_messages
 from vergence_metric.disparity.angular_disparity import angular_disparity
+from vergence_metric.edges.edges import to_grey
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import PairMeasurementParameters
+from vergence_metric.pairs.ideal_images import IdealImages
 from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_rig.camera import CameraModel
 from vergence_rig.joint_history import JointHistory
@@ -77,41 +79,40 @@ class MetricOfPairs:
     """edge_metric_node's work on a pair, as the observations that gaze_controller_node makes of its messages."""
 
     def __init__(self, rig: Rig, calibrations: Mapping[str, CameraSpec | None]) -> None:
+        self._rig = rig
         self._measurement = PairMeasurement(PairMeasurementParameters(), rig)
         # Without a calibration the nodes take rig.yaml's cameras.
         left, right = (CameraModel(calibrations[eye] or rig.camera(eye == "left")) for eye in EYES)
-        self._models = left, right
+        self._ideal = IdealImages(rig)
+        self.images = self._ideal.set_cameras((left, right))
+        """Both eyes' images, as their camera_info and the rig describe them."""
         self._joints = JointHistory()
-
-    @property
-    def left_camera(self) -> CameraModel:
-        """The left camera as its camera_info describes it."""
-        return self._models[0]
 
     def on_joints(self, stamp_s: float, angles_rad: Mapping[str, float]) -> None:
         """Keep a joint report."""
-        self._joints.add(_ns(stamp_s), list(angles_rad), list(angles_rad.values()))
+        angles = self._rig.eye_angles([angles_rad[name] for name in JOINT_NAMES])
+        self._joints.add(_ns(stamp_s), JOINT_NAMES, angles)
 
     def on_request(self, request: TrackRequest) -> None:
         """Pass the controller's request on to the tracker; it takes effect at the next pair, as in the node."""
-        self._measurement.request_track(track_request(gaze_messages.track_request(request, *self._models)))
+        self._measurement.request_track(track_request(gaze_messages.track_request(request, self.images), self.images))
 
     def observe(self, left: Image, right: Image, left_stamp_s: float, right_stamp_s: float) -> list[Observation]:
         """Measure a pair and return what the controller receives of it."""
         header = Header(stamp=to_stamp(left_stamp_s))
         skew_s = right_stamp_s - left_stamp_s
-        measurement, models = self._measurement, self._models
-        edge = measurement.edge(left, right)
+        measurement, camera = self._measurement, self.images[0].ideal
+        edge = measurement.edge(*self._ideal.draw(to_grey(left), to_grey(right)))
         now_ns = _ns(left_stamp_s)
         eyes = self._joints.at(now_ns, _ns(right_stamp_s))
         passed = self._joints.samples_between(now_ns - _LOOK_BACK_NS, now_ns)
-        track = measurement.track(edge, left_stamp_s, eyes, models, [(ns * 1e-9, angles) for ns, angles in passed])
-        angular = angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
-        tracked = track_message(track, edge, angular, header, skew_s)
+        track = measurement.track(edge, left_stamp_s, eyes, camera, [(ns * 1e-9, angles) for ns, angles in passed])
+        angular = angular_disparity(camera, camera, track.left_px, track.disparity_px, track.vertical_px)
+        tracked = track_message(track, edge, angular, self.images, header, skew_s)
         measurement.update_alignment()
         return [
             gaze_messages.track_contrast(tracked),
-            gaze_messages.track_sighting(tracked, models[0]),
+            gaze_messages.track_sighting(tracked, self.images[0]),
         ]
 
 
@@ -145,7 +146,7 @@ class Lockstep:
 
     def click(self, pixel: tuple[float, float]) -> int:
         """Ask the controller to look at a pixel (x, y) of the newest left image that was published."""
-        x, y = self.metric.left_camera.undistort([pixel])[0]
+        x, y = self.metric.images[0].undistort([pixel])[0]
         goal = Goal(
             GoalKind.PIXEL,
             left_eye=True,

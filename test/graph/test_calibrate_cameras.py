@@ -97,6 +97,7 @@ def test_one_eye_alone(tmp_path: Path) -> None:
         (lambda left, right: ["--left", *left[:2]], "at least 3"),
         (lambda left, right: ["--left", *left, "--board", "six"], "COLUMNSxROWS"),
         (lambda left, right: ["--left", *left, "--square-m", "-1"], "square_m"),
+        (lambda left, right: ["--left", "absent.png", "/dev/null", "/", "--square-m", "0.02"], "none of the 3 views"),
     ],
 )
 def test_wrong_input_is_one_line(
@@ -123,6 +124,18 @@ def test_the_published_set(tmp_path: Path) -> None:
     stereo = yaml.safe_load((tmp_path / "stereo.yaml").read_text())
     assert max(stereo["rms_px"], stereo["left_rms_px"], stereo["right_rms_px"]) <= 0.3
     assert load_calibration(tmp_path / "left.yaml").k[0] == pytest.approx(535.9, rel=0.01)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the chessboard pictures (../shared/data) are not here")
+def test_swapped_eyes_of_the_published_set_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = {eye: sorted(map(str, DATA.glob(f"{eye}*.jpg")))[:6] for eye in ("left", "right")}
+    status, _ = calibrate(
+        *("--left", *files["right"], "--right", *files["left"]),
+        *("--board", "9x6", "--square-m", "0.025", "--out", str(tmp_path / "out")),
+    )
+    assert status == 2
+    assert "the right eye must be to the right of the left one" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("compressed", [True, False])

@@ -85,6 +85,31 @@ def test_a_pipe_instead_of_a_file(option: str, domain_id: int, tmp_path: Path) -
     assert "must be" in _only_line(result, "servo_node: ")
 
 
+@pytest.mark.parametrize("executable", sorted(NODES))
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (b"/**:\n  ros__parameters: {a: [[[[" + b"[" * 100, "nested at most 20 deep"),
+        (b"\xff\xfe\x00", "text in UTF-8"),
+        (b"nosuch_node:\n  ros__parameters: {a: 1}\n", "it has them for /nosuch_node"),
+        (b'/**:\n  ros__parameters: {"\\ud800": 1}\n', "surrogate"),
+    ],
+    ids=["nesting", "binary", "name of the node", "surrogate"],
+)
+def test_a_parameter_file_that_cannot_be(
+    executable: str, text: bytes, words: str, domain_id: int, tmp_path: Path
+) -> None:
+    (tmp_path / "file.yaml").write_bytes(text)
+    result = _run([str(find_node(executable)), "--ros-args", "--params-file", str(tmp_path / "file.yaml")], {})
+    assert words in _only_line(result, f"{executable}: ")
+
+
+def test_a_parameter_file_of_one_node_of_a_host(domain_id: int, tmp_path: Path) -> None:
+    (tmp_path / "file.yaml").write_text("servo_nod:\n  ros__parameters: {backend: fake}\n")
+    given = ["--nodes", "servo_node", "--params", f"servo_node={tmp_path / 'file.yaml'}"]
+    assert "write '/**/servo_node:'" in _only_line(_run([str(find_node("head_node")), *given], {}), "head_node: ")
+
+
 @pytest.mark.parametrize("executable", sorted({*NODES, *HOSTS}))
 def test_arguments_that_nothing_reads_and_help(executable: str, domain_id: int) -> None:
     path = str(find_node(executable))

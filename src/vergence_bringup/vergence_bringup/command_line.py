@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from vergence_bringup.machine import build_hint
+from vergence_rig.printed import printed_line
 
 COMMANDS = {
     "demo": ("vergence_bringup.demo.ros.command", "run the graph on the simulated head and write a report"),
@@ -13,7 +14,7 @@ COMMANDS = {
     "calibrate": ("vergence_bringup.commands.calibrate", "calibrate the cameras from chessboard or ChArUco views"),
     "identify": (
         "vergence_calibration.ros.identify",
-        "measure latencies, pixels per radian and signs of a running head and write them to YAML",
+        "measure timing and geometry of a running head and write them to YAML",
     ),
     "look": ("vergence_bringup.ros.look", "look at a pixel, a class, a point or by angles, and say whether it verged"),
     "watch": ("vergence_bringup.ros.watch", "show a running graph in the terminal"),
@@ -32,7 +33,7 @@ def main(args: Sequence[str] | None = None) -> int:
         try:
             return int(options.run(options))
         except (ValueError, OSError) as error:
-            print(f"vergence {options.command}: {error}", file=sys.stderr)
+            print(f"vergence {options.command}: {printed_line(error)}", file=sys.stderr)
             return 2
     except KeyboardInterrupt:
         return 130

@@ -11,7 +11,7 @@ import pytest
 
 from vergence_camera.calibration.boards import Board, BoardError, Charuco, Chessboard, Detection, parse_board
 from vergence_camera.calibration.report import intrinsics_text, pose_text, stereo_document, write_results
-from vergence_camera.calibration.solve import SolveError, solve_camera, solve_pair
+from vergence_camera.calibration.solve import SolveError, StereoPose, check_sides, solve_camera, solve_pair
 from vergence_camera.calibration.views import EYES, View, ViewCollector, coverage_of
 from vergence_camera.camera_info import load_calibration
 
@@ -289,3 +289,16 @@ def test_either_shape_of_opencvs_corners(monkeypatch: pytest.MonkeyPatch, shape:
 
     monkeypatch.setattr(cv2, "findChessboardCorners", reshaped)
     assert np.array_equal(BOARD.detect(picture).points_px, expected)
+
+
+@pytest.mark.parametrize(
+    ("translation_m", "swapped"),
+    [((-0.065, 0.0, 0.0), False), ((0.065, 0.002, 0.01), True), ((1e-6, 0.0, 0.0), False), ((0.01, 0.1, 0.0), False)],
+)
+def test_eyes_that_are_swapped_are_refused(translation_m: tuple[float, float, float], swapped: bool) -> None:
+    pose = StereoPose(np.eye(3), np.array(translation_m), 0.1, {}, {})
+    if swapped:
+        with pytest.raises(SolveError, match=r"65\.0 mm to its left; exchange --left and --right"):
+            check_sides(pose)
+    else:
+        check_sides(pose)

@@ -89,7 +89,7 @@ def test_a_monocular_projection_is_filled_in() -> None:
         ("camera_matrix", {"data": [1.0, 2.0]}, "9 finite numbers"),
         ("camera_matrix", {"rows": 3, "cols": 3}, "'data'"),
         ("camera_matrix", {"data": [0.0] * 9}, "focal lengths"),
-        ("distortion_model", "fisheye", "plumb_bob, rational_polynomial, equidistant"),
+        ("distortion_model", "fisheye", "'plumb_bob', 'rational_polynomial', 'equidistant'"),
         ("distortion_coefficients", {"data": [0.1, float("nan"), 0, 0, 0]}, "finite"),
         ("distortion_coefficients", {"data": [0.1] * 7}, "4 or 5"),
         ("projection_matrix", {"data": ["a"] * 12}, "numbers"),

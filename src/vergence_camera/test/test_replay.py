@@ -1,7 +1,9 @@
 """Recordings come at their rate, loop or end, and say when they are broken."""
 
 import itertools
+import os
 import shutil
+import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -166,3 +168,70 @@ def test_the_kind_of_recording_is_found_by_content(mjpeg_avi: Path, tmp_path: Pa
     folder = tmp_path / "folder"
     folder.mkdir()
     assert isinstance(open_recording(folder), FolderRecording)
+
+
+@pytest.fixture
+def spoilt_folder(tmp_path: Path, make_jpeg: Callable[..., bytes]) -> Path:
+    """Eight things of which the fourth and the last are pictures of 320x240."""
+    folder = tmp_path / "spoilt"
+    folder.mkdir()
+    (folder / "._a1.jpg").write_bytes(b"\0\5\26\7 AppleDouble")
+    (folder / ".hidden.jpg").write_bytes(make_jpeg(0, 64, 48))
+    (folder / "a1.jpg").write_bytes(b"\0\5\26\7 no picture")
+    (folder / "a2.jpg").write_bytes(make_jpeg(2, 320, 240))
+    os.mkfifo(folder / "a3.jpg")
+    (folder / "a4.jpg").mkdir()
+    (folder / "a5.png").write_bytes(b"")
+    (folder / "a6.jpg").write_bytes(make_jpeg(6, 320, 240))
+    return folder
+
+
+def test_what_is_no_picture_in_a_folder_costs_one_frame_or_nothing(spoilt_folder: Path, replay: Play) -> None:
+    source = replay(spoilt_folder)
+    assert str(source.open()) == "MJPG 320x240 at 30 Hz"
+    outcomes: list[object] = []
+    while len(outcomes) < 8:
+        try:
+            frame = source.read(1.0)
+        except CorruptFrameError as error:
+            outcomes.append(str(error).rpartition("/")[2].split()[0].rstrip(":"))
+        else:
+            outcomes += [frame.width_px] if frame is not None else []
+    assert outcomes == ["a1.jpg", 320, "a5.png", 320] * 2
+
+
+def test_a_folder_without_a_usable_picture_is_refused_with_the_first_reason(tmp_path: Path, replay: Play) -> None:
+    for name in ("a.jpg", "b.png"):
+        (tmp_path / name).write_bytes(b"text")
+    with pytest.raises(UnsupportedError, match=r"none of its 2 pictures can be used: .*a\.jpg"):
+        replay(tmp_path).open()
+
+
+@pytest.mark.parametrize("must_be_whole", [True, False])
+def test_a_cut_jpeg_of_a_folder_is_played_where_corrupt_frames_are_not_dropped(
+    tmp_path: Path, make_jpeg: Callable[..., bytes], must_be_whole: bool
+) -> None:
+    (tmp_path / "a.jpg").write_bytes(make_jpeg(0, 320, 240))
+    (tmp_path / "b.jpg").write_bytes(make_jpeg(1, 320, 240)[:-40])
+    source = Replay(open_recording(tmp_path), ModeRequest(), rate_hz=1000, must_be_whole=must_be_whole)
+    source.open()
+    assert source.read(1.0) is not None
+    if must_be_whole:
+        with pytest.raises(CorruptFrameError, match="end marker"):
+            source.read(1.0)
+    else:
+        assert source.read(1.0) is not None
+
+
+def test_a_picture_that_exif_turns_comes_out_turned(
+    tmp_path: Path, make_jpeg: Callable[..., bytes], replay: Play
+) -> None:
+    directory = b"II*\0\x08\0\0\0\x01\0" + struct.pack("<HHIHH", 274, 3, 1, 6, 0) + bytes(4)
+    payload = b"Exif\0\0" + directory
+    data = make_jpeg(0, 320, 240)
+    (tmp_path / "a.jpg").write_bytes(data[:2] + b"\xff\xe1" + struct.pack(">H", len(payload) + 2) + payload + data[2:])
+    source = replay(tmp_path)
+    assert (source.open().width_px, source.open().height_px) == (240, 320)
+    frame = source.read(1.0)
+    assert frame is not None
+    assert (frame.width_px, frame.height_px, frame.encoding) == (240, 320, Encoding.BGR)

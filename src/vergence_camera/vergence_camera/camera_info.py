@@ -12,9 +12,10 @@ import yaml
 
 from vergence_rig.atomic_file import write_atomically
 from vergence_rig.camera_limits import CameraModelError, check_camera
+from vergence_rig.parameters import shown
+from vergence_rig.regular_file import expanded
 from vergence_rig.yaml_file import YamlFileError, read_yaml
 
-DISTORTION_LENGTHS = {"plumb_bob": (4, 5), "rational_polynomial": (8, 12, 14), "equidistant": (4,)}
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -45,16 +46,6 @@ class Calibration:
             raise CameraCalibrationError(f"image size must be at least 1x1: got {self.width_px}x{self.height_px}")
         if not (self.k[0] > 0.0 and self.k[4] > 0.0):
             raise CameraCalibrationError(f"focal lengths must be above 0: got {self.k[0]:g}, {self.k[4]:g}")
-        lengths = DISTORTION_LENGTHS.get(self.distortion_model)
-        if lengths is None:
-            known = ", ".join(DISTORTION_LENGTHS)
-            raise CameraCalibrationError(f"distortion_model must be one of {known}: got {self.distortion_model!r}")
-        if len(self.d) not in lengths or not all(math.isfinite(value) for value in self.d):
-            allowed = " or ".join(map(str, lengths))
-            raise CameraCalibrationError(
-                f"distortion_coefficients must be {allowed} finite numbers: got {list(self.d)}"
-            )
-
         try:
             check_camera(
                 self.width_px,
@@ -119,6 +110,8 @@ def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -
     filled = (url or "file://${ROS_HOME}/camera_info/${NAME}.yaml").replace("${ROS_HOME}", ros_home)
     filled = filled.replace("${NAME}", name)
     parts = urlsplit(filled)
+    if parts.scheme == "file" and parts.netloc.startswith("~") and parts.path:
+        return expanded(unquote(parts.netloc + parts.path))
     if parts.scheme == "file" and parts.netloc in ("", "localhost") and parts.path:
         return Path(unquote(parts.path))
     if parts.scheme == "package" and parts.netloc and parts.path:
@@ -126,7 +119,9 @@ def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -
             return Path(package_share(parts.netloc)) / unquote(parts.path).lstrip("/")
         except LookupError as error:
             raise CameraCalibrationError(f"camera_info_url must name an installed package: got '{url}'") from error
-    raise CameraCalibrationError(f"camera_info_url must be file:///PATH or package://PACKAGE/PATH: got '{url}'")
+    raise CameraCalibrationError(
+        f"camera_info_url must be file:///PATH, file://~/PATH or package://PACKAGE/PATH: got '{url}'"
+    )
 
 
 def _matrix(rows: int, columns: int, data: Sequence[float]) -> dict[str, Any]:
@@ -140,19 +135,26 @@ def _from_document(document: Any) -> Calibration:
     return Calibration(
         width_px=_whole(document, "image_width"),
         height_px=_whole(document, "image_height"),
-        name=str(document.get("camera_name", "camera")),
+        name=_text(document, "camera_name", "camera"),
         k=k,
         d=_numbers(document, "distortion_coefficients"),
-        distortion_model=str(document.get("distortion_model", "plumb_bob")),
+        distortion_model=_text(document, "distortion_model", "plumb_bob"),
         r=_numbers(document, "rectification_matrix") if "rectification_matrix" in document else IDENTITY,
         p=_numbers(document, "projection_matrix") if "projection_matrix" in document else (),
     )
 
 
+def _text(document: dict[str, Any], entry: str, default: str) -> str:
+    value = document.get(entry, default)
+    if not isinstance(value, (str, int)) or isinstance(value, bool):
+        raise CameraCalibrationError(f"{entry} must be a text: got {shown(value)}")
+    return str(value)
+
+
 def _whole(document: dict[str, Any], entry: str) -> int:
     value = document.get(entry)
     if not isinstance(value, int) or isinstance(value, bool):
-        raise CameraCalibrationError(f"{entry} must be a whole number: got {value!r}")
+        raise CameraCalibrationError(f"{entry} must be a whole number: got {shown(value)}")
     return value
 
 
@@ -160,5 +162,7 @@ def _numbers(document: dict[str, Any], entry: str) -> tuple[float, ...]:
     value = document.get(entry)
     data = value.get("data") if isinstance(value, dict) else None
     if not isinstance(data, list) or not all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in data):
-        raise CameraCalibrationError(f"{entry} must be a mapping with a list of numbers under 'data': got {value!r}")
+        raise CameraCalibrationError(
+            f"{entry} must be a mapping with a list of numbers under 'data': got {shown(value)}"
+        )
     return tuple(float(x) for x in data)

@@ -5,7 +5,7 @@ from typing import NamedTuple, TypeAlias
 
 from vergence_camera.errors import CorruptFrameError
 
-_START, _END = b"\xff\xd8", b"\xff\xd9"
+JPEG_START, _END = b"\xff\xd8", b"\xff\xd9"
 _FRAME_HEADERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _START_OF_SCAN = 0xDA
 # Inside entropy-coded data 0xFF is stuffed with 0x00; only restart markers may stand there.
@@ -39,7 +39,7 @@ def inspect_jpeg(data: bytes, *, must_be_whole: bool = True) -> JpegInfo:
     Raises:
         CorruptFrameError: no picture, no size, or not whole.
     """
-    if not data.startswith(_START):
+    if not data.startswith(JPEG_START):
         raise CorruptFrameError(f"frame of {len(data)} bytes does not begin like a JPEG (ff d8): {data[:4].hex(' ')}")
     head = data[: data.find(_SCAN, 2) + 4]
     cached = _headers_by_bytes.get(head)

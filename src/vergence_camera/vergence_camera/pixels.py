@@ -5,6 +5,8 @@ import numpy as np
 
 from vergence_camera.errors import CorruptFrameError
 from vergence_camera.frame import Encoding, Frame, Pixels
+from vergence_rig.picture_file import decode_picture
+from vergence_rig.regular_file import FileError
 
 
 def decode(frame: Frame) -> tuple[Pixels, str]:
@@ -21,10 +23,13 @@ def decode(frame: Frame) -> tuple[Pixels, str]:
     if frame.encoding is Encoding.YUYV:
         packed = raw.reshape(frame.height_px, frame.width_px, 2)
         return np.asarray(cv2.cvtColor(packed, cv2.COLOR_YUV2BGR_YUYV)), "bgr8"
-    pixels = cv2.imdecode(raw, cv2.IMREAD_COLOR)
-    if pixels is None or pixels.shape[:2] != (frame.height_px, frame.width_px):
-        raise CorruptFrameError(f"JPEG of {len(frame.data)} bytes cannot be decoded")
-    return np.asarray(pixels), "bgr8"
+    try:
+        pixels = decode_picture(raw, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    except FileError as error:
+        raise CorruptFrameError(f"JPEG {error}") from error
+    if pixels.shape[:2] != (frame.height_px, frame.width_px):
+        raise CorruptFrameError(f"JPEG of {frame.width_px}x{frame.height_px} decodes to another size")
+    return pixels, "bgr8"
 
 
 def encode_jpeg(pixels: Pixels, quality: int) -> bytes:

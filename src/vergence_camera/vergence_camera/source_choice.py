@@ -15,6 +15,7 @@ from vergence_camera.sources.recordings import open_recording
 from vergence_camera.sources.replay import Replay
 from vergence_camera.v4l2.capture import DeviceUser, V4l2Source
 from vergence_camera.v4l2.kernel import Kernel, LinuxKernel
+from vergence_rig.regular_file import expanded
 
 _VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".webm", ".ts", ".mpg", ".h264", ".264", ".m3u8", ".mjpg")
 
@@ -97,13 +98,18 @@ def _scheme(text: str) -> str:
 def _is_recording(text: str) -> bool:
     if text.startswith("/dev/") or re.fullmatch(r"(serial|port|number):.*|\d{1,3}", text):
         return False
-    path = Path(text).expanduser()
+    path = expanded(text)
     return path.exists() or "/" in text or path.suffix.lower() in _VIDEO_SUFFIXES
 
 
 def _recording(path: Path, options: SourceOptions) -> FrameSource:
-    recording = open_recording(path.expanduser())
-    return Replay(recording, options.request, rate_hz=options.replay_rate_hz, loop=options.replay_loop)
+    return Replay(
+        open_recording(expanded(path)),
+        options.request,
+        rate_hz=options.replay_rate_hz,
+        loop=options.replay_loop,
+        must_be_whole=options.drop_corrupt,
+    )
 
 
 def _file_url(url: str, options: SourceOptions) -> FrameSource:

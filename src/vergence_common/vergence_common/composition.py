@@ -7,8 +7,13 @@ value.
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+
+from vergence_common.parameter_files import node_name, with_checked_files
 
 
 @dataclass(frozen=True)
@@ -17,6 +22,19 @@ class Composition:
 
     own: dict[str, list[str]]
     common: list[str]
+
+    def maker(self, name: str, node: Callable[..., Node], *remappings: str, **options: Any) -> Callable[[], Node]:
+        """Return what makes a node with its own arguments, parameter files checked, and with these options.
+
+        Its module's name is that of the node.
+        """
+
+        def make() -> Node:
+            arguments = [*self.own[name], *(part for rule in remappings for part in ("-r", rule))]
+            full_name = node_name(node.__module__.rpartition(".")[2], [*self.common, *arguments])
+            return node(cli_args=with_checked_files(arguments, [full_name]), **options)
+
+        return make
 
     @property
     def namespace(self) -> str:

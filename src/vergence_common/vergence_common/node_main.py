@@ -32,16 +32,19 @@ def run_node(make_node: Callable[[], Node], args: Sequence[str] | None = None, g
     if any(argument in HELP for argument in without_ros(arguments)):
         print(help_text(_executable(), sys.modules[make_node.__module__].__doc__ or "", groups))
         return 0
-    return run_nodes([make_node], arguments)
+    return run_nodes([make_node], arguments, [make_node.__module__.rpartition(".")[2]])
 
 
-def run_nodes(makers: Sequence[Callable[[], Node]], args: Sequence[str] | None = None) -> int:
+def run_nodes(
+    makers: Sequence[Callable[[], Node]], args: Sequence[str] | None = None, names: Sequence[str] = ()
+) -> int:
     """Make nodes in this order, spin them on one thread until SIGINT, SIGTERM or shutdown, and close them.
 
     A node's own `close()`, where it has one, releases hardware and joins its threads. What the user gave and cannot be
     used (an argument, the environment, a parameter, a rig or calibration) is one line on standard error and status 2.
     A clean end is status 0, also of a node that ends while it is being made. They are closed in
-    the order in which they were made: the sources first.
+    the order in which they were made: the sources first. `names` are their names, unless the arguments give others: a
+    parameter file must have something for them.
     """
     arguments = sys.argv[1:] if args is None else list(args)
     keep_large_blocks()
@@ -53,7 +56,7 @@ def run_nodes(makers: Sequence[Callable[[], Node]], args: Sequence[str] | None =
         signal.signal(number, lambda *_: stop_asked.set())
     try:
         check_leftovers(_executable(), arguments)
-        init(arguments)
+        init(arguments, names)
     except Exception as error:
         return _bad_input(error)
     nodes: list[Node] = []

@@ -6,8 +6,6 @@ import pwd
 import re
 import tempfile
 from collections.abc import Sequence
-from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -17,7 +15,9 @@ from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
 from vergence_common.arguments import remaps
-from vergence_rig.yaml_file import YamlFileError, read_yaml
+from vergence_common.parameter_files import node_name, with_checked_files
+from vergence_rig.printed import printed_line
+from vergence_rig.regular_file import expanded
 
 LARGEST_DOMAIN_ID = 232
 """RTPS computes port numbers from the domain: those of a higher one do not exist."""
@@ -39,19 +39,21 @@ class StartError(ValueError):
     """A start that cannot succeed: the message names the thing, what must hold, and the value."""
 
 
-def init(arguments: Sequence[str] | None = None, **options: Any) -> None:
-    """Initialise rclpy with these arguments (None: of the command line). Raises StartError.
+def init(arguments: Sequence[str] | None = None, nodes: Sequence[str] = (), **options: Any) -> None:
+    """Initialise rclpy with these arguments (None: of the command line). Raises StartError or ParameterFileError.
 
-    Environment and names are checked first: rcl would write several lines, or start and be unable to communicate.
+    Environment, names and parameter files are checked first: rcl would write several lines, or start and be unable to
+    communicate. `nodes` are the names that the nodes have unless the arguments give others.
     """
     if options.get("domain_id") is None:
         _check_domain()
     _ensure_home()
     _check_log_folder()
     _check_names(arguments or ())
-    _check_parameter_files(arguments or ())
+    if arguments is not None:
+        arguments = with_checked_files(arguments, [node_name(name, arguments) for name in nodes])
     try:
-        rclpy.init(args=list(arguments) if arguments is not None else None, **options)
+        rclpy.init(args=arguments, **options)
     except REFUSALS as error:
         raise StartError(one_line(error)) from error
 
@@ -70,8 +72,8 @@ def checked_namespace(text: str) -> str | None:
 def one_line(error: BaseException) -> str:
     """Return an exception's text as one line, without the places in rcl's source files."""
     if isinstance(error, NameValidationException):
-        return _name_text(error)
-    text = " ".join(str(error).split()) or type(error).__name__
+        return printed_line(_name_text(error))
+    text = printed_line(error) or type(error).__name__
     if isinstance(error, rclpy_implementation.UnknownROSArgsError):
         return f"arguments after --ros-args must be those of ROS: got {text}"
     return re.sub(r", at /[^ ]*\.(c|cpp|h|hpp):\d+", "", text)
@@ -102,7 +104,7 @@ def _ensure_home() -> None:
 def _check_log_folder() -> None:
     places = (("ROS_LOG_DIR", ""), ("ROS_HOME", "log"), ("HOME", ".ros/log"))
     name, below = next(((name, below) for name, below in places if os.environ.get(name)), ("HOME", ""))
-    folder = Path(os.environ[name]).expanduser() / below
+    folder = expanded(os.environ[name]) / below
     try:
         folder.mkdir(parents=True, exist_ok=True)
         reason = "" if os.access(folder, os.W_OK | os.X_OK) else os.strerror(errno.EACCES)
@@ -111,16 +113,6 @@ def _check_log_folder() -> None:
     if reason:
         text = f"{name} must be a folder in which logs can be written: got {os.environ[name]!r} ({folder}: {reason})"
         raise StartError(text + ("" if name == "ROS_LOG_DIR" else "; ROS_LOG_DIR may name another"))
-
-
-def _check_parameter_files(arguments: Sequence[str]) -> None:
-    # rcl waits for a pipe, and answers faults with two lines or not at all.
-    for option, path in pairwise(arguments):
-        if option == "--params-file":
-            try:
-                read_yaml(path)
-            except YamlFileError as error:
-                raise StartError(f"parameter file '{path}' {error}") from error
 
 
 def _check_names(arguments: Sequence[str]) -> None:

@@ -81,3 +81,27 @@ def test_image_without_size() -> None:
 def test_camera_info_without_distortion() -> None:
     model = CameraModel.from_camera_info_values(640, 480, K, [], "")
     np.testing.assert_allclose(model.undistort([[319.5, 0]]), [[0, -239.5 / 539]])
+
+
+_D14 = (0.3, -0.2, 0.001, 0.0005, 0.05, 0.6, -0.1, 0.02, 0.002, -0.001, -0.0015, 0.0008, 0.02, -0.03)
+
+
+@pytest.mark.parametrize("name", ["plumb_bob", "rational_polynomial"])
+@pytest.mark.parametrize("count", [4, 5, 8, 12, 14])
+def test_every_number_of_coefficients_is_opencvs(count: int, name: str) -> None:
+    k = [539.0, 0, 319.5, 0, 541.0, 239.5, 0, 0, 1]
+    model = CameraModel.from_camera_info_values(640, 480, k, _D14[:count], name)
+    rays = np.random.default_rng(count).uniform((-0.5, -0.4, 1), (0.5, 0.4, 1), (200, 3))
+    expected, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.reshape(k, (3, 3)), np.array(_D14[:count]))
+    assert np.allclose(model.ray_to_pixel(rays), expected.reshape(-1, 2), atol=1e-6)
+    assert np.allclose(model.undistort(model.ray_to_pixel(rays)), rays[:, :2], atol=1e-7)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 6, 7, 9, 13, 15])
+def test_another_number_is_refused_with_those_that_can_be(count: int) -> None:
+    with pytest.raises(CameraModelError, match=r"0 or 4 or 5 or 8 or 12 or 14 values for 'plumb_bob': got \d"):
+        CameraModel.from_camera_info_values(640, 480, [539.0, 0, 319.5, 0, 539.0, 239.5, 0, 0, 1], [0.0] * count)
+
+
+def test_a_rig_takes_what_a_camera_info_takes() -> None:
+    assert CameraModel(CameraSpec(distortion=_D14)).distortion.tolist() == list(_D14)

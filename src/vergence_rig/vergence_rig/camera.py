@@ -1,8 +1,8 @@
 """The camera model: pixels to rays and back, lens distortion included.
 
 Pixels have their origin at the centre of the top-left pixel, x right, y down. The optical frame has z forward, x right,
-y down. Distortion is OpenCV's and ROS's: `plumb_bob` (k1 k2 p1 p2 k3), `rational_polynomial` (eight coefficients) and
-`equidistant` (fisheye, four).
+y down. Distortion is OpenCV's and ROS's: `plumb_bob` and `rational_polynomial` (4, 5, 8, 12 or 14 coefficients in
+OpenCV's order: radial, tangential, thin prism, tilt) and `equidistant` (fisheye, four).
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,6 @@ __all__ = ["CameraModel", "CameraModelError"]
 
 Array = npt.NDArray[np.float64]
 
-_COEFFICIENTS = {"": (0, 4, 5), "plumb_bob": (0, 4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
 _ITERATIONS = 50
 _TOLERANCE = 1e-10
 _BENDS_NO_RAY = 1e-9
@@ -62,20 +61,15 @@ class CameraModel:
         self.fx_px, self.fy_px, self.cx_px, self.cy_px = (float(value) for value in intrinsics)
         if self.width_px <= 0 or self.height_px <= 0:
             raise CameraModelError(f"image size must be at least 1 x 1 [px]: got {width} x {height}")
-        if distortion_model not in _COEFFICIENTS:
-            known = ", ".join(repr(name) for name in _COEFFICIENTS if name)
-            raise CameraModelError(f"distortion_model must be one of {known}: got {distortion_model!r}")
         coefficients = np.asarray(d, dtype=np.float64).reshape(-1)
-        if coefficients.size not in _COEFFICIENTS[distortion_model]:
-            counts = " or ".join(str(count) for count in _COEFFICIENTS[distortion_model])
-            raise CameraModelError(
-                f"distortion must be {counts} values for '{distortion_model}': got {coefficients.size}"
-            )
+        check_camera(self.width_px, self.height_px, intrinsics, coefficients.tolist(), distortion_model)
         self.distortion_model = distortion_model or "plumb_bob"
-        check_camera(self.width_px, self.height_px, intrinsics, coefficients.tolist(), self.distortion_model)
         self.distortion = coefficients
         self._is_distorted = bool(np.any(coefficients)) or self.distortion_model == "equidistant"
-        self._limit = _monotone_limit(coefficients) if self.distortion_model == "plumb_bob" else np.inf
+        self._tilt = _tilt_projection(coefficients[12:]) if coefficients.size == 14 else None
+        # With a denominator (k4 to k6) the radius has no bound of this form.
+        polynomial = self.distortion_model != "equidistant" and not np.any(coefficients[5:8])
+        self._limit = _monotone_limit(coefficients) if polynomial else np.inf
 
     def equals(self, other: "CameraModel") -> bool:
         """Return whether another model maps every pixel alike."""
@@ -151,15 +145,19 @@ class CameraModel:
             bent = theta * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
             scale = np.where(radius > 1e-12, bent / np.maximum(radius, 1e-12), 1.0)
             return np.column_stack([x * scale, y * scale])
-        k1, k2, p1, p2, k3, k4, k5, k6 = np.concatenate([self.distortion, np.zeros(8 - self.distortion.size)])
+        k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = np.concatenate([self.distortion, np.zeros(12)])[:12]
         square = x * x + y * y
         radial = (1 + square * (k1 + square * (k2 + square * k3))) / (1 + square * (k4 + square * (k5 + square * k6)))
-        return np.column_stack(
+        bent_points = np.column_stack(
             [
-                x * radial + 2 * p1 * x * y + p2 * (square + 2 * x * x),
-                y * radial + p1 * (square + 2 * y * y) + 2 * p2 * x * y,
+                x * radial + 2 * p1 * x * y + p2 * (square + 2 * x * x) + square * (s1 + square * s2),
+                y * radial + p1 * (square + 2 * y * y) + 2 * p2 * x * y + square * (s3 + square * s4),
             ]
         )
+        if self._tilt is None:
+            return bent_points
+        tilted = np.column_stack([bent_points, np.ones(len(points))]) @ self._tilt.T
+        return np.asarray(tilted[:, :2] / tilted[:, 2:])
 
     def _jacobian(self, points: Array) -> Array:
         step = 1e-6
@@ -185,6 +183,16 @@ def _start_equidistant(distorted: Array) -> Array:
     bent = np.hypot(distorted[:, 0], distorted[:, 1])
     radius = np.tan(np.minimum(bent, 1.5))
     return distorted * (radius / np.maximum(bent, 1e-12))[:, None]
+
+
+def _tilt_projection(tilts_rad: Array) -> Array:
+    """Return OpenCV's matTilt (3, 3): the image plane turned about x, then y, and projected along z."""
+    (cos_x, cos_y), (sin_x, sin_y) = np.cos(tilts_rad), np.sin(tilts_rad)
+    about_x = np.array([[1, 0, 0], [0, cos_x, sin_x], [0, -sin_x, cos_x]])
+    about_y = np.array([[cos_y, 0, -sin_y], [0, 1, 0], [sin_y, 0, cos_y]])
+    turned = about_y @ about_x
+    projection = np.array([[turned[2, 2], 0, -turned[0, 2]], [0, turned[2, 2], -turned[1, 2]], [0, 0, 1]])
+    return np.asarray(projection @ turned)
 
 
 def _monotone_limit(coefficients: Array) -> float:

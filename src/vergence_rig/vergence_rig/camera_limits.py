@@ -13,6 +13,14 @@ FOCAL_PER_SIZE = (0.1, 100.0)
 CENTRE_PER_SIZE = (-1.0, 2.0)
 """Principal point over the image's width or height."""
 
+_OPENCV = (0, 4, 5, 8, 12, 14)
+COEFFICIENTS = {"": _OPENCV, "plumb_bob": _OPENCV, "rational_polynomial": _OPENCV, "equidistant": (4,)}
+"""Numbers of distortion coefficients by `distortion_model`. In OpenCV's order (k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tx
+ty) the count says what they are, and drivers give either name."""
+
+LARGEST_TILT_RAD = 0.5
+"""Largest tilt of the sensor against the lens, about x and about y."""
+
 RADIUS_RATIO = 2.0
 """Largest ratio, either way, of a ray's radius without and with distortion, where the image's nearer border lies."""
 
@@ -41,9 +49,15 @@ def check_camera(
         width_px: width of the image [px].
         height_px: height of the image [px].
         intrinsics: fx, fy, cx, cy [px].
-        distortion: coefficients in OpenCV's order; more than eight (thin prism, tilt) are only checked to be numbers.
-        model: `plumb_bob`, `rational_polynomial` or `equidistant`.
+        distortion: coefficients in OpenCV's order.
+        model: a key of COEFFICIENTS.
     """
+    if model not in COEFFICIENTS:
+        known = ", ".join(repr(name) for name in COEFFICIENTS if name)
+        raise CameraModelError(f"distortion_model must be one of {known}: got {model!r}")
+    if len(distortion) not in COEFFICIENTS[model]:
+        counts = " or ".join(str(count) for count in COEFFICIENTS[model])
+        raise CameraModelError(f"distortion must be {counts} values for '{model}': got {len(distortion)}")
     fx, fy, cx, cy = (float(value) for value in intrinsics)
     if fx == fy == 0:
         raise CameraModelError("the camera is not calibrated (fx and fy are 0): run vergence calibrate cameras")
@@ -80,7 +94,10 @@ def _border_has_a_ray(coefficients: npt.NDArray[np.float64], border: float, mode
             bent = radii * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
         else:
             k1, k2, p1, p2, k3, k4, k5, k6 = np.concatenate([coefficients, np.zeros(8)])[:8]
-            if not 3 * max(abs(p1), abs(p2)) * border * border <= _TANGENTIAL_SHARE * border:
+            prism = np.concatenate([coefficients, np.zeros(14)])[8:12]
+            sideways = 3 * max(abs(p1), abs(p2)) + float(np.abs(prism) @ (1, border**2, 1, border**2))
+            tilts = np.abs(coefficients[12:])
+            if not sideways * border <= _TANGENTIAL_SHARE or (tilts > LARGEST_TILT_RAD).any():
                 return False
             numerator = 1 + square * (k1 + square * (k2 + square * k3))
             bent = radii * numerator / (1 + square * (k4 + square * (k5 + square * k6)))

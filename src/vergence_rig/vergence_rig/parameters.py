@@ -14,10 +14,13 @@ parameter descriptors) and the shipped YAML (a test holds it equal to the defaul
 
 import dataclasses
 import math
+import reprlib
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
+
+from vergence_rig.spelling import spelling_hint
 
 _KEY = "vergence_parameter"
 
@@ -32,12 +35,19 @@ REQUIRED: Any = _Required()
 
 
 _LONGEST_SHOWN = 200
+_REPR = reprlib.Repr()
+_REPR.maxlevel, _REPR.maxother = 4, _LONGEST_SHOWN
+_REPR.maxstring = _REPR.maxlong = _LONGEST_SHOWN
+_REPR.maxdict = _REPR.maxlist = _REPR.maxtuple = _REPR.maxset = 20
 
 
 def shown(value: object) -> str:
-    """Return a value as it stands in an error message: at most some 200 characters of it."""
+    """Return a value as it stands in an error message: at most some 200 characters of it.
+
+    Only the beginning of a container is looked at: a small YAML file can be one of billions of elements.
+    """
     try:
-        text = repr(value)
+        text = _REPR.repr(value)
     except ValueError:  # Python writes no integer of more than 4300 digits
         return "a number of more than 4300 digits"
     except RecursionError:
@@ -48,16 +58,22 @@ def shown(value: object) -> str:
 class ParameterError(ValueError):
     """An invalid parameter value: the message names the parameter, what it must be, and the value given.
 
-    `allowed` completes the sentence "parameter 'X' must be ...".
+    `allowed` completes the sentence "parameter 'X' must be ...". `hint` says how to spell what was probably meant, with
+    NAME for the name.
     """
 
-    def __init__(self, name: str, value: object, allowed: str) -> None:
-        super().__init__(f"parameter '{name}' must be {allowed}: got {shown(value)}")
-        self.name, self.value, self.allowed = name, value, allowed
+    def __init__(self, name: str, value: object, allowed: str, hint: str = "") -> None:
+        self.name, self.value, self.allowed, self.hint = name, value, allowed, hint
+        super().__init__(f"parameter '{name}' must be {allowed}: got {shown(value)}{self.advice}")
+
+    @property
+    def advice(self) -> str:
+        """The hint as the end of a sentence; "" without one."""
+        return f"; {self.hint.replace('NAME', self.name)}" if self.hint else ""
 
     def prefixed(self, prefix: str) -> "ParameterError":
         """Return the same error with `prefix` before the parameter's name: the group or the file's key it stands in."""
-        return ParameterError(prefix + self.name, self.value, self.allowed)
+        return ParameterError(f"{prefix}{self.name}", self.value, self.allowed, self.hint)
 
 
 class RenamedParameterError(ParameterError):
@@ -66,7 +82,7 @@ class RenamedParameterError(ParameterError):
     def __init__(self, name: str, value: object, new_name: str, unit: str) -> None:
         in_unit = f" (in {unit})" if unit else ""
         ValueError.__init__(self, f"parameter '{name}' was renamed: set '{new_name}'{in_unit} instead")
-        self.name, self.value, self.allowed = name, value, f"named '{new_name}'"
+        self.name, self.value, self.allowed, self.hint = name, value, f"named '{new_name}'", ""
 
 
 class UnknownParameterError(ParameterError):
@@ -76,11 +92,11 @@ class UnknownParameterError(ParameterError):
         self._known = tuple(sorted(known))
         names = ", ".join(self._known)
         ValueError.__init__(self, f"there is no parameter '{name}': its name must be one of {names}")
-        self.name, self.value, self.allowed = name, value, f"named one of {names}"
+        self.name, self.value, self.allowed, self.hint = name, value, f"named one of {names}", ""
 
     def prefixed(self, prefix: str) -> ParameterError:
         """See ParameterError."""
-        return UnknownParameterError(prefix + self.name, self.value, [prefix + name for name in self._known])
+        return UnknownParameterError(f"{prefix}{self.name}", self.value, [prefix + name for name in self._known])
 
 
 @dataclass(frozen=True)
@@ -130,8 +146,11 @@ class ParameterSpec:
         if not self.is_list:
             return self._normalised_element(value, value)
         if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
-            raise ParameterError(self.name, value, self.allowed)
+            raise ParameterError(self.name, value, self.allowed, self._hint(value))
         return tuple(self._normalised_element(element, value) for element in value)
+
+    def _hint(self, value: Any) -> str:
+        return spelling_hint(self.kind, self.is_list, self.choices, value)
 
     def _normalised_element(self, element: Any, whole: Any) -> Any:
         if self.kind is float and isinstance(element, int) and not isinstance(element, bool):
@@ -140,7 +159,7 @@ class ParameterSpec:
             except OverflowError:
                 raise ParameterError(self.name, whole, self.allowed) from None
         if type(element) is not self.kind:  # not isinstance: True is no whole number
-            raise ParameterError(self.name, whole, self.allowed)
+            raise ParameterError(self.name, whole, self.allowed, "" if self.is_list else self._hint(element))
         if isinstance(element, float) and not math.isfinite(element):
             raise ParameterError(self.name, whole, self.allowed)
         if self.choices is not None and element not in self.choices:

@@ -7,8 +7,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from vergence_rig.camera_limits import CameraLimitError, check_camera
-from vergence_rig.parameters import ParameterError, Parameters, parameter
+from vergence_rig.camera_limits import COEFFICIENTS, CameraLimitError, check_camera
+from vergence_rig.parameters import ParameterError, Parameters, parameter, shown
 from vergence_rig.servo import MG995, SG90, ServoSpec
 
 JOINT_NAMES = ("pan_left", "pan_right", "tilt")
@@ -23,7 +23,7 @@ class RigError(ValueError):
 
 @dataclass(frozen=True)
 class CameraSpec(Parameters):
-    """One camera: image size, intrinsics and `plumb_bob` distortion (k1 k2 p1 p2 k3)."""
+    """One camera: image size, intrinsics and distortion in OpenCV's order (k1 k2 p1 p2 k3 ...)."""
 
     width_px: int = parameter(640, "image width", unit="px", minimum=16, maximum=16384)
     height_px: int = parameter(480, "image height", unit="px", minimum=16, maximum=16384)
@@ -32,13 +32,17 @@ class CameraSpec(Parameters):
     cx_px: float = parameter(319.5, "principal point, x", unit="px", minimum=-1e5, maximum=1e5)
     cy_px: float = parameter(239.5, "principal point, y", unit="px", minimum=-1e5, maximum=1e5)
     distortion: tuple[float, ...] = parameter(
-        (0.0, 0.0, 0.0, 0.0, 0.0), "plumb_bob distortion coefficients k1 k2 p1 p2 k3", minimum=-100, maximum=100
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        "distortion coefficients in OpenCV's order, k1 k2 p1 p2 k3 ...",
+        minimum=-100,
+        maximum=100,
     )
 
     def check(self) -> None:
         """See Parameters."""
-        if len(self.distortion) != 5:
-            raise ParameterError("distortion", self.distortion, "a list of five numbers: k1 k2 p1 p2 k3")
+        if len(self.distortion) not in COEFFICIENTS["plumb_bob"]:
+            allowed = "a list of five numbers (k1 k2 p1 p2 k3), or of 0, 4, 8, 12 or 14 in OpenCV's order"
+            raise ParameterError("distortion", self.distortion, allowed)
         try:
             check_camera(
                 self.width_px,
@@ -271,4 +275,4 @@ def default_rig() -> Rig:
 
 def _check_number(key: str, value: float, minimum: float, maximum: float, unit: str) -> None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not minimum <= value <= maximum:
-        raise RigError(f"{key} must be a number from {minimum:g} to {maximum:g} [{unit}]: got {value!r}")
+        raise RigError(f"{key} must be a number from {minimum:g} to {maximum:g} [{unit}]: got {shown(value)}")

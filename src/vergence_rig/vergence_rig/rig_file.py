@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from vergence_rig.parameters import ParameterError, Parameters
+from vergence_rig.parameters import ParameterError, Parameters, shown
 from vergence_rig.rig import JOINT_NAMES, CameraSpec, EyeMount, Joints, JointSpec, Rig, RigError, default_rig
 from vergence_rig.servo import PRESETS, ServoSpec
+from vergence_rig.spelling import spelling_hint
 from vergence_rig.yaml_file import YamlFileError, read_yaml
 
 _NUMBERS = ("baseline_m", "tilt_axis_x_m", "tilt_axis_z_m", "minimum_vergence_rad")
@@ -79,7 +80,7 @@ def _servo(value: Any) -> ServoSpec:
     if isinstance(value, str):
         if value not in PRESETS:
             known = ", ".join(repr(name) for name in PRESETS)
-            raise RigError(f"servo must be one of {known}, or a mapping of its parameters: got {value!r}")
+            raise RigError(f"servo must be one of {known}, or a mapping of its parameters: got {shown(value)}")
         return PRESETS[value]
     return _parameters("servo", ServoSpec(), value)
 
@@ -92,20 +93,21 @@ def _parameters(key: str, default: Spec, value: Any) -> Spec:
     try:
         return default.replaced(**entries)
     except ParameterError as error:
-        raise RigError(f"{key}.{error.name} must be {error.allowed}: got {error.value!r}") from error
+        raise RigError(f"{key}.{error.name} must be {error.allowed}: got {shown(error.value)}{error.advice}") from error
 
 
 def _mapping(key: str, value: Any, allowed: tuple[str, ...]) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        raise RigError(f"{key} must be a mapping with any of {', '.join(allowed)}: got {value!r}")
+        raise RigError(f"{key} must be a mapping with any of {', '.join(allowed)}: got {shown(value)}")
     for name in value:
         if name not in allowed:
-            raise RigError(f"{key} must have no keys but {', '.join(allowed)}: got {name!r}")
+            raise RigError(f"{key} must have no keys but {', '.join(allowed)}: got {shown(name)}")
     return value
 
 
 def _number(entries: Mapping[str, Any], key: str, default: float) -> float:
     value = entries.get(key, default)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise RigError(f"{key} must be a number: got {value!r}")
+        hint = spelling_hint(float, False, None, value).replace("NAME", key)
+        raise RigError(f"{key} must be a number: got {shown(value)}{hint and f'; {hint}'}")
     return float(value)

@@ -1,44 +1,32 @@
 """The one way to read a YAML file: kind, size, depth, numbers and keys are checked, and every fault is one line."""
 
-import os
-import stat
+import re
 from collections.abc import Hashable
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from vergence_rig.printed import printed_line
+from vergence_rig.regular_file import FileError, read_regular_file
+
 LARGEST_BYTES = 1_000_000
 DEEPEST = 20
 LONGEST_INTEGER = 20
 
 
-class YamlFileError(ValueError):
+class YamlFileError(FileError):
     """A file that cannot be used: the message says why, and does not name the file."""
 
 
 def read_small_text(path: str | Path) -> str:
     """Return the text of a regular file of at most LARGEST_BYTES. Raises YamlFileError; never waits for a pipe."""
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-    except (OSError, ValueError) as error:
-        raise YamlFileError(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    try:
-        found = os.fstat(descriptor)
-        if stat.S_ISDIR(found.st_mode):
-            raise YamlFileError("cannot be read: Is a directory")
-        if not stat.S_ISREG(found.st_mode):
-            raise YamlFileError("cannot be read: it must be a regular file, no pipe, socket or device")
-        if found.st_size > LARGEST_BYTES:
-            raise YamlFileError(f"cannot be read: it must have at most {LARGEST_BYTES} bytes: got {found.st_size}")
-        with os.fdopen(descriptor, "rb", closefd=False) as file:
-            data = file.read(LARGEST_BYTES + 1)
-    finally:
-        os.close(descriptor)
-    try:
-        return data.decode("utf-8")
+        return read_regular_file(path, LARGEST_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise YamlFileError(f"is not YAML: it must be text in UTF-8 ({error.reason} at byte {error.start})") from error
+    except FileError as error:
+        raise YamlFileError(str(error)) from error
 
 
 def read_yaml(path: str | Path) -> Any:
@@ -51,9 +39,9 @@ def parse_yaml(text: str) -> Any:
     try:
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
-        raise YamlFileError(f"is not YAML: {' '.join(str(error).split())}") from error
-    except (ValueError, OverflowError, RecursionError) as error:
-        raise YamlFileError(f"is not YAML: a value cannot be read: {' '.join(str(error).split())}") from error
+        raise YamlFileError(f"is not YAML: {printed_line(error)}") from error
+    except Exception as error:  # PyYAML lets through what its constructors raise, an AttributeError for a date
+        raise YamlFileError(f"is not YAML: a value cannot be read: {printed_line(error)}") from error
 
 
 class _Loader(yaml.SafeLoader):
@@ -86,11 +74,32 @@ class _Loader(yaml.SafeLoader):
                 seen.add(key)
         return dict(super().construct_mapping(node, deep=deep))
 
+    def construct_scalar(self, node: Any) -> Any:
+        value = super().construct_scalar(node)
+        if isinstance(value, str) and any("\ud800" <= character <= "\udfff" for character in value):
+            text = "a text must be of Unicode characters: got half a surrogate pair"
+            raise yaml.MarkedYAMLError(None, None, text, node.start_mark)
+        return value
+
     def construct_limited_int(self, node: Any) -> int:
         if len(node.value) > LONGEST_INTEGER:
             text = f"a whole number must have at most {LONGEST_INTEGER} digits: got {len(node.value)}"
             raise yaml.MarkedYAMLError(None, None, text, node.start_mark)
-        return int(self.construct_yaml_int(node))
+        return int(node.value, 10 if node.value.lstrip("-+")[:2].isdigit() else 0)
 
 
+# Numbers as in YAML 1.2 and in rcl: YAML 1.1 has no 3e-04 without a point, and takes the serial number 0123 for 83,
+# and 12:30 for 750.
+_LIKE_NUMBERS = frozenset(f"tag:yaml.org,2002:{kind}" for kind in ("int", "float"))
+_NUMBERS = {
+    "int": r"[-+]?(?:0|[1-9][0-9]*|0x[0-9a-fA-F]+|0o[0-7]+|0b[01]+)\Z",
+    "float": r"(?:[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[-+]?[0-9]+[eE][-+]?[0-9]+"
+    r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z",
+}
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _LIKE_NUMBERS]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _kind, _pattern in _NUMBERS.items():
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(_pattern), list("-+.0123456789"))
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_limited_int)

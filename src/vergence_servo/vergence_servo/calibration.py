@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vergence_rig.parameters import REQUIRED, ParameterError, Parameters, parameter
+from vergence_rig.parameters import REQUIRED, ParameterError, Parameters, parameter, shown
 from vergence_rig.rig import JointSpec
 from vergence_rig.servo import MG995, SG90, ServoSpec
 from vergence_rig.yaml_file import YamlFileError, read_yaml
@@ -138,7 +138,8 @@ def servos_from_mapping(document: Any) -> dict[str, ServoCalibration]:
         if not isinstance(joint, str) or not isinstance(entries, Mapping):
             raise ServoCalibrationError(f"servos.{joint} must be a mapping of parameters: got {_short(entries)}")
         try:
-            preset = PRESETS.get(str(entries.get("model", "")), {})
+            model = entries.get("model", "")
+            preset = PRESETS.get(model, {}) if isinstance(model, str) else {}
             servos[joint] = ServoCalibration.from_mapping({**preset, **entries})
         except ParameterError as error:
             raise ServoCalibrationError(str(error.prefixed(f"servos.{joint}."))) from error
@@ -179,7 +180,7 @@ def load_servos(path: str | Path) -> dict[str, ServoCalibration]:
 
 
 def _short(value: object) -> str:
-    text = repr(value)
+    text = shown(value)
     return text if len(text) < 80 else text[:77] + "..."
 
 

@@ -7,13 +7,15 @@ from itertools import zip_longest
 from pathlib import Path
 
 import cv2
-import numpy as np
 
 from vergence_bringup.ros.live_board_views import collect_live
 from vergence_camera.calibration.boards import BoardError, parse_board
 from vergence_camera.calibration.report import intrinsics_text, pose_text, write_results
-from vergence_camera.calibration.solve import Intrinsics, SolveError, StereoPose, solve_camera, solve_pair
+from vergence_camera.calibration.solve import Intrinsics, SolveError, StereoPose, check_sides, solve_camera, solve_pair
 from vergence_camera.calibration.views import EYES, Verdict, ViewCollector
+from vergence_rig.picture_file import Pixels, read_picture
+from vergence_rig.printed import printed_line
+from vergence_rig.regular_file import FileError, expanded
 
 Say = Callable[[str], None]
 
@@ -24,9 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Calibrate the cameras with a chessboard or ChArUco board. With --left and --right the views are read from "
         "files, pair by pair; without, they come live from the running camera nodes (Ctrl-C ends the collection)."
     )
-    parser.add_argument("--left", nargs="+", type=Path, metavar="FILE", help="images of the left eye")
+    parser.add_argument("--left", nargs="+", type=expanded, metavar="FILE", help="images of the left eye")
     parser.add_argument(
-        "--right", nargs="+", type=Path, metavar="FILE", help="images of the right eye, in the order of the left ones"
+        "--right",
+        nargs="+",
+        type=expanded,
+        metavar="FILE",
+        help="images of the right eye, in the order of the left ones",
     )
     parser.add_argument(
         "--board",
@@ -35,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--square-m", type=float, default=0.025, metavar="M", help="side of a square (default: 0.025)")
     parser.add_argument("--marker-m", type=float, metavar="M", help="side of a marker (default: 3/4 of a square)")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the three YAML files")
+    parser.add_argument("--out", type=expanded, required=True, metavar="DIR", help="folder for the three YAML files")
     live = parser.add_argument_group("live")
     live.add_argument("--views", type=int, default=25, metavar="N", help="number of views to collect (default: 25)")
     live.add_argument(
@@ -71,7 +77,7 @@ def run(args: argparse.Namespace, say: Say = print) -> int:
         for path in write_results(args.out, cameras, pose, board_values):
             say(f"wrote {path}")
     except (BoardError, SolveError, OSError) as error:
-        print(f"vergence calibrate cameras: {error}", file=sys.stderr)
+        print(f"vergence calibrate cameras: {printed_line(error)}", file=sys.stderr)
         return 2
     return 0
 
@@ -83,19 +89,26 @@ def _from_files(collector: ViewCollector, left: Sequence[Path], right: Sequence[
     for number, pair in enumerate(zip_longest(left, right), start=1):
         files = {eye: file for eye, file in zip(EYES, pair, strict=True) if file is not None}
         name = " + ".join(file.name for file in files.values())
-        read = {eye: cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) for eye, file in files.items()}
-        pictures = {eye: np.asarray(picture) for eye, picture in read.items() if picture is not None}
-        unreadable = [str(files[eye]) for eye in files if eye not in pictures]
-        if unreadable:
-            verdict = Verdict(name, False, f"not readable as images: {', '.join(unreadable)}")
+        try:
+            verdict = collector.offer(name, {eye: _picture(file) for eye, file in files.items()})
+        except FileError as error:
+            verdict = Verdict(name, False, str(error))
             collector.verdicts.append(verdict)
-        else:
-            verdict = collector.offer(name, pictures)
         say(f"[{number}/{total}] {name}: " + ("accepted" if verdict.accepted else f"rejected: {verdict.reason}"))
     return collector
 
 
+def _picture(file: Path) -> Pixels:
+    try:
+        return read_picture(file, cv2.IMREAD_GRAYSCALE)
+    except FileError as error:
+        raise FileError(f"not readable as images: {file} {error}") from error
+
+
 def _solve(collector: ViewCollector, say: Say) -> tuple[dict[str, Intrinsics], StereoPose | None]:
+    if not collector.views:
+        _report_rejected(collector, {}, None, say)
+        raise SolveError(f"none of the {len(collector.verdicts)} views can be used: nothing is written")
     cameras = {}
     for eye in collector.size_px:
         cameras[eye] = solve_camera(collector.views, eye, collector.size_px[eye])
@@ -106,6 +119,7 @@ def _solve(collector: ViewCollector, say: Say) -> tuple[dict[str, Intrinsics], S
         sound = [view for view in collector.views if view.name not in left_out]
         pose = solve_pair(sound, cameras["left"], cameras["right"])
         say(pose_text(pose))
+        check_sides(pose)
     _report_rejected(collector, cameras, pose, say)
     return cameras, pose
 

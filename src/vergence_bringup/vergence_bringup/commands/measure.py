@@ -12,17 +12,18 @@ from vergence_bringup.figures.pictures import Image, combined_edges, read_image,
 from vergence_metric.alignment.parameters import AlignmentParameters
 from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric
+from vergence_rig.regular_file import expanded
 
 SHIPPED = "shipped"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the subcommand."""
-    parser.add_argument("left", type=Path, metavar="LEFT", help="image of the left eye")
-    parser.add_argument("right", type=Path, metavar="RIGHT", help="image of the right eye, of the same size")
+    parser.add_argument("left", type=expanded, metavar="LEFT", help="image of the left eye")
+    parser.add_argument("right", type=expanded, metavar="RIGHT", help="image of the right eye, of the same size")
     parser.add_argument(
         "--out",
-        type=Path,
+        type=expanded,
         metavar="DIR",
         help="write left_edges.png, right_edges.png, combined_edges.png and, with --model, boxes.png",
     )

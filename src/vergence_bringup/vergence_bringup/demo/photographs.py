@@ -14,6 +14,7 @@ from vergence_bringup.demo.stations import Station
 from vergence_bringup.figures.pictures import write_image
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.install_hint import install_hint
+from vergence_rig.regular_file import expanded
 from vergence_rig.rig import Rig
 from vergence_sim.photo.matching import matched_disparity
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint, read_pair
@@ -135,7 +136,7 @@ def open_photographs(given: Sequence[str], out_dir: Path, count: int = CLICKS) -
         raise ValueError(
             f"--photos must be followed by two paths, LEFT RIGHT, or by none: got {len(given)} ({' '.join(given)})"
         )
-    left, right = (Path(path).expanduser() for path in given)
+    left, right = map(expanded, given)
     pair = read_pair(left, right)
     if min(pair.width_px, pair.height_px) < _LEAST_SIDE_PX:
         raise ValueError(

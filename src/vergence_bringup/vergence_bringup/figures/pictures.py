@@ -9,6 +9,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vergence_rig.picture_file import read_picture
+from vergence_rig.regular_file import FileError, expanded
+
 Image = npt.NDArray[np.uint8]
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
@@ -21,18 +24,15 @@ class PictureError(ValueError):
 
 def read_image(path: Path) -> Image:
     """Return an image file as (h, w, 3) BGR uint8; raises PictureError where it cannot be decoded."""
-    if not path.is_file():
-        raise PictureError(f"image {path}: no such file")
-    image = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR) if path.stat().st_size else None
-    if image is None:
-        raise PictureError(
-            f"image {path} must be a complete PNG, JPEG or another format that OpenCV reads: it cannot be decoded"
-        )
-    return np.asarray(image, np.uint8)
+    try:
+        return read_picture(path)
+    except FileError as error:
+        raise PictureError(f"image {path} {error}") from error
 
 
 def write_image(path: Path, image: npt.NDArray[Any]) -> None:
     """Write an image and create its folder; raises PictureError where that fails."""
+    path = expanded(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     if not cv2.imwrite(str(path), image):
         raise PictureError(f"image {path}: cannot be written")

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from vergence_rig.regular_file import FileError, check_regular_file, expanded
 from vergence_servo.drivers.registry import backend_names
 
 TRUE_FALSE = ("true", "false")
@@ -48,9 +49,18 @@ class LaunchArgument:
         """Return what is wrong with a value, or None."""
         if self.choices and value not in self.choices:
             return f"{self.name} must be {_listed(self.choices)}: got {value!r}"
-        if self.is_file and not (value == "" and self.default == "") and not Path(value).is_file():
-            return f"{self.name} must be the path of an existing file: got {value!r}"
+        if self.is_file and not (value == "" and self.default == ""):
+            try:
+                check_regular_file(value)
+            except FileError as error:
+                return f"{self.name} must be the path of an existing file: got {value!r}, which {error}"
         return None
+
+    def read(self, text: str) -> str:
+        """Return the value of a text of the command line: `~` expanded in paths, `True` and `TRUE` as `true`."""
+        if self.is_file and text:
+            return str(expanded(text))
+        return text.lower() if self.choices == TRUE_FALSE and text.lower() in TRUE_FALSE else text
 
 
 def _switch(name: str, description: str, default: str) -> LaunchArgument:

@@ -1,7 +1,6 @@
 """head_node: cameras, metrics, control and servos in one process; images pass in memory."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from rclpy.node import Node
 
@@ -23,11 +22,9 @@ def main(args: Sequence[str] | None = None) -> int:
     composition = parse([*CAMERAS, *METRICS, *JOINTS], USUAL, "Run a whole head in one process.", args)
     images = LocalImages()
     cameras = [
-        partial(
-            CameraNode, images=images, cli_args=[*composition.own[name], "-r", f"__ns:={composition.namespace}/{eye}"]
-        )
+        composition.maker(name, CameraNode, f"__ns:={composition.namespace}/{eye}", images=images)
         for name, eye in CAMERAS.items()
         if name in composition.own
     ]
-    joints = [partial(make, cli_args=composition.own[name]) for name, make in JOINTS.items() if name in composition.own]
+    joints = [composition.maker(name, make) for name, make in JOINTS.items() if name in composition.own]
     return run_nodes([*cameras, *metric_makers(composition, images), *joints], composition.common)

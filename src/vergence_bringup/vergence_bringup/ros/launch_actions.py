@@ -53,7 +53,7 @@ def described(file: str, build: Build, check: Check = lambda values: []) -> Laun
     """
 
     def checked(context: LaunchContext) -> list[Any]:
-        values = {argument.name: context.launch_configurations[argument.name] for argument in ARGUMENTS[file]}
+        values = {a.name: a.read(context.launch_configurations[a.name]) for a in ARGUMENTS[file]}
         found = unknown(file, sys.argv) + problems(file, values)
         if values.get("frames") == "true" and not _installed(_FRAMES):
             found.append(f"frames must be auto or false without the package {_FRAMES}: got 'true' ({_FRAMES_APT})")

@@ -10,7 +10,6 @@ import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -19,6 +18,7 @@ from vergence_calibration import backed_up_file
 from vergence_calibration.servos import servo_file
 from vergence_calibration.servos.jog_session import JogSession
 from vergence_calibration.servos.terminal import NoTerminalError, Terminal
+from vergence_rig.regular_file import expanded
 from vergence_rig.rig_file import load_rig
 from vergence_servo.calibration import ServoCalibration, ServoCalibrationError, default_servos, load_servos
 from vergence_servo.driver_set import DriverSet, backends_of
@@ -32,7 +32,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="calibrate_servos", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--servos", required=True, type=Path, help="servos.yaml to update; created if missing")
+    parser.add_argument("--servos", required=True, type=expanded, help="servos.yaml to update; created if missing")
     parser.add_argument(
         "--joint", action="append", help="calibrate only this joint (repeatable; default: all in the file)"
     )

@@ -14,6 +14,7 @@ from vergence_camera.camera_info import Calibration
 Matrix = npt.NDArray[np.float64]
 
 LEAST_VIEWS = 3
+_LEAST_BASELINE_M = 1e-3
 # With fewer views the sixth power of the radius bends to the noise instead of the lens.
 _VIEWS_FOR_K3 = 12
 _OUTLIER_FACTOR = 3.0
@@ -124,6 +125,17 @@ def solve_pair(views: Sequence[View], left: Intrinsics, right: Intrinsics) -> St
             "between the two pictures?"
         )
         kept = [view for view in kept if view.name != worst]
+
+
+def check_sides(pose: StereoPose) -> None:
+    """Raise SolveError where the eye called right is left of the other."""
+    # The pose takes points of the left eye to the right one: what is seen from further right lies further left.
+    across_m = float(pose.translation_m[0])
+    if across_m > _LEAST_BASELINE_M and across_m >= 0.5 * float(np.linalg.norm(pose.translation_m)):
+        raise SolveError(
+            f"the right eye must be to the right of the left one: it is {across_m * 1e3:.1f} mm to its left; "
+            "exchange --left and --right (live: left_device and right_device). Nothing is written"
+        )
 
 
 def _solve_once(views: Sequence[View], eye: str, size_px: tuple[int, int]) -> Intrinsics:

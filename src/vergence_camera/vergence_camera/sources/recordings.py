@@ -8,14 +8,16 @@ import cv2
 import numpy as np
 
 from vergence_camera.errors import CorruptFrameError, FileMissingError, TruncatedFileError, UnsupportedError
-from vergence_camera.frame import Mode, Pixels
-from vergence_camera.jpeg import inspect_jpeg
+from vergence_camera.frame import Mode
+from vergence_camera.jpeg import JPEG_START, inspect_jpeg
 from vergence_camera.sources.avi_demuxer import frames, is_avi, read_header
 from vergence_camera.sources.replay import Picture, Recording
 from vergence_camera.sources.requested_mode import mode_of
+from vergence_rig.exif import is_turned
+from vergence_rig.picture_file import check_size, decode_picture
+from vergence_rig.regular_file import FileError, check_regular_file, read_regular_file
 
 PICTURE_SUFFIXES = {".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"}
-_JPEG_SUFFIXES = {".jpg", ".jpeg"}
 
 
 class AviRecording:
@@ -35,7 +37,7 @@ class AviRecording:
             header = read_header(file, self.identity)
         return Mode("MJPG", header.width_px, header.height_px, header.rate_hz)
 
-    def pictures(self) -> Iterator[Picture]:
+    def pictures(self) -> Iterator[bytes]:
         """See Recording."""
         with self._path.open("rb", buffering=0) as file:  # the demuxer reads only what it needs
             header = read_header(file, self.identity)
@@ -87,7 +89,11 @@ class VideoRecording:
 
 
 class FolderRecording:
-    """A folder of pictures, in natural order of their names; JPEGs pass through untouched."""
+    """A folder of pictures, in natural order of their names; JPEGs pass through untouched.
+
+    Hidden files, folders, pipes and devices are not looked at. A JPEG that its EXIF orientation turns is decoded, so
+    that it comes out as every viewer shows it.
+    """
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -98,12 +104,18 @@ class FolderRecording:
         return str(self._path)
 
     def mode(self) -> Mode:
-        """See Recording."""
-        first = self._load(self._files()[0])
-        if isinstance(first, bytes):
-            info = inspect_jpeg(first)
-            return Mode("MJPG", info.width_px, info.height_px, 0.0)
-        return Mode("GREY" if first.ndim == 2 else "BGR3", first.shape[1], first.shape[0], 0.0)
+        """See Recording. It is that of the first picture that can be used."""
+        reasons = []
+        for file in self._files():
+            picture = self._load(file)
+            if isinstance(picture, CorruptFrameError):
+                reasons.append(str(picture))
+            elif isinstance(picture, bytes):
+                info = inspect_jpeg(picture, must_be_whole=False)
+                return Mode("MJPG", info.width_px, info.height_px, 0.0)
+            else:
+                return Mode("GREY" if picture.ndim == 2 else "BGR3", picture.shape[1], picture.shape[0], 0.0)
+        raise UnsupportedError(f"{self._path}: none of its {len(reasons)} pictures can be used: {reasons[0]}")
 
     def pictures(self) -> Iterator[Picture]:
         """See Recording."""
@@ -111,28 +123,43 @@ class FolderRecording:
             yield self._load(file)
 
     def _files(self) -> list[Path]:
-        files = [file for file in self._path.iterdir() if file.suffix.lower() in PICTURE_SUFFIXES]
+        try:
+            files = [
+                file
+                for file in self._path.iterdir()
+                if file.suffix.lower() in PICTURE_SUFFIXES and not file.name.startswith(".") and file.is_file()
+            ]
+        except OSError as error:
+            raise FileMissingError(f"{self._path}: cannot be read: {error.strerror}") from error
         if not files:
             kinds = ", ".join(sorted(PICTURE_SUFFIXES))
             raise FileMissingError(f"{self._path}: has no pictures in it ({kinds})")
         return sorted(files, key=_natural)
 
     def _load(self, file: Path) -> Picture:
-        data = file.read_bytes()
-        if file.suffix.lower() in _JPEG_SUFFIXES:
-            return data
-        pixels: Pixels | None = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYCOLOR) if data else None
-        if pixels is None:
-            raise CorruptFrameError(f"{file}: cannot be decoded")
-        return pixels
+        try:
+            data = read_regular_file(file)
+            if not data.startswith(JPEG_START):
+                return decode_picture(data, cv2.IMREAD_ANYCOLOR)
+            info = inspect_jpeg(data, must_be_whole=False)
+            check_size(info.width_px, info.height_px)
+            return decode_picture(data) if is_turned(data) else data
+        except FileError as error:
+            return CorruptFrameError(f"{file} {error}")
+        except CorruptFrameError as error:
+            return CorruptFrameError(f"{file}: {error}")
 
 
 def open_recording(path: Path) -> Recording:
-    """Return the recording at `path`; raise FileMissingError if there is none."""
+    """Return the recording at `path`; raise FileMissingError if there is none that can be read."""
     if path.is_dir():
         return FolderRecording(path)
-    if not path.is_file():
+    if not path.exists():
         raise FileMissingError(f"{path}: there is no such file")
+    try:
+        check_regular_file(path)
+    except FileError as error:
+        raise FileMissingError(f"{path} {error}") from error
     if path.suffix.lower() in PICTURE_SUFFIXES:
         raise UnsupportedError(f"{path}: is one picture; give its folder")
     if is_avi(path):

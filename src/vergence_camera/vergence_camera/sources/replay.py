@@ -5,13 +5,15 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Protocol, TypeAlias
 
-from vergence_camera.errors import CorruptFrameError, ReplayEndedError, TruncatedFileError
+from vergence_camera.errors import CorruptFrameError, ReplayEndedError, TruncatedFileError, UnsupportedError
 from vergence_camera.frame import Clock, Encoding, Frame, Mode, ModeRequest, Pixels
 from vergence_camera.jpeg import inspect_jpeg
 from vergence_camera.sources.requested_mode import check_requested, size_alone
+from vergence_rig.picture_file import check_size
+from vergence_rig.regular_file import FileError
 
-# One recorded picture: JPEG bytes as they lie in the file, or decoded pixels (BGR or grey).
-Picture: TypeAlias = bytes | Pixels
+# One recorded picture: JPEG bytes as they lie in the file, decoded pixels (BGR or grey), or why it cannot be used.
+Picture: TypeAlias = bytes | Pixels | CorruptFrameError
 
 
 class Recording(Protocol):
@@ -36,7 +38,8 @@ class Replay:
 
     A frame's capture time is when it was due, on the monotonic clock, so that replayed stamps are as even as the
     recording's. `rate_hz` replaces the recording's own rate (0 keeps it; without one it is `default_rate_hz`). When
-    the process was held up for longer than `catch_up_s`, the schedule starts anew instead of racing after it.
+    the process was held up for longer than `catch_up_s`, the schedule starts anew instead of racing after it. A JPEG
+    that is not whole is a CorruptFrameError unless `must_be_whole` is False.
     """
 
     def __init__(
@@ -46,12 +49,13 @@ class Replay:
         *,
         rate_hz: float = 0.0,
         loop: bool = True,
+        must_be_whole: bool = True,
         catch_up_s: float = 0.25,
         default_rate_hz: float = 30.0,
         sleep: Callable[[float], None] = time.sleep,
         now_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        self._recording, self._request, self._loop = recording, request, loop
+        self._recording, self._request, self._loop, self._must_be_whole = recording, request, loop, must_be_whole
         self._asked_rate_hz, self._default_rate_hz, self._catch_up_ns = rate_hz, default_rate_hz, int(catch_up_s * 1e9)
         self._sleep, self._now_ns = sleep, now_ns
         self._pictures: Iterator[Picture] | None = None
@@ -67,6 +71,10 @@ class Replay:
         """See FrameSource. Size and format must be as requested; the rate is the recording's unless one was given."""
         self.close()
         found = self._recording.mode()
+        try:
+            check_size(found.width_px, found.height_px)
+        except FileError as error:
+            raise UnsupportedError(f"{self.identity} {error}") from error
         rate = self._asked_rate_hz or found.rate_hz or self._default_rate_hz
         self._mode = Mode(found.pixel_format, found.width_px, found.height_px, rate)
         check_requested(size_alone(self._request), self._mode, self.identity, "recording")
@@ -120,8 +128,10 @@ class Replay:
             raise ReplayEndedError(f"{self.identity}: has no picture in it")
 
     def _frame(self, picture: Picture, time_ns: int, sequence: int) -> Frame:
+        if isinstance(picture, CorruptFrameError):
+            raise picture
         if isinstance(picture, bytes):
-            info = inspect_jpeg(picture)
+            info = inspect_jpeg(picture, must_be_whole=self._must_be_whole)
             width, height, encoding = info.width_px, info.height_px, Encoding.JPEG
         else:
             height, width = picture.shape[:2]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.boxes.errors import DetectorError, ModelFileError, ModelLayoutError
 from vergence_rig.install_hint import install_hint
+from vergence_rig.regular_file import FileError, check_regular_file, expanded
 
 SHIPPED_MODEL = Path(__file__).resolve().parent.parent / "models" / "rubik_cube.onnx"
 
@@ -59,9 +60,13 @@ class ModelSession:
             ModelLayoutError: its input is not a picture.
 
         """
-        self.path = Path(path).expanduser() if str(path) else SHIPPED_MODEL
-        if not self.path.is_file():
+        self.path = expanded(path) if str(path) else SHIPPED_MODEL
+        if not self.path.exists():
             raise ModelFileError(f"model {self.path}: no such file")
+        try:
+            check_regular_file(self.path)
+        except FileError as error:
+            raise ModelFileError(f"model {self.path} {error}") from error
         try:
             import onnxruntime
         except ImportError as error:

@@ -1,7 +1,6 @@
 """stereo_node: edge metric, boxes and eye rotation in one process; images are received, decoded and paired once."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from rclpy.node import Node
 
@@ -21,11 +20,7 @@ METRICS: dict[str, Callable[..., Node]] = {
 
 def metric_makers(composition: Composition, images: LocalImages) -> list[Callable[[], Node]]:
     """Return what makes each chosen metric node; the first receives the images that `images` does not offer."""
-    return [
-        partial(METRICS[name], images=images, cli_args=arguments)
-        for name, arguments in composition.own.items()
-        if name in METRICS
-    ]
+    return [composition.maker(name, METRICS[name], images=images) for name in composition.own if name in METRICS]
 
 
 def main(args: Sequence[str] | None = None) -> int:

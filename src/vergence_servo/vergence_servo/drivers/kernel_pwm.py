@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vergence_rig.parameters import Parameters, parameter
+from vergence_rig.regular_file import expanded
 from vergence_servo.drivers.protocol import Backend, ChannelError, DriverIoError, DriverUnavailableError
 
 _OVERLAY = "dtoverlay=pwm-2chan,pin=12,func=4,pin2=13,func2=4"
@@ -47,7 +48,7 @@ class KernelPwmDriver:
 
     def __init__(self, parameters: KernelPwmParameters | None = None) -> None:
         values = parameters or KernelPwmParameters()
-        self._chip = _find_chip(Path(values.root), values.chip)
+        self._chip = _find_chip(expanded(values.root), values.chip)
         self._count = _read_count(self._chip)
         self._period_ns = round(1e9 / values.frequency_hz)
         self._enabled: set[int] = set()

@@ -4,7 +4,6 @@ import dataclasses
 import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -20,6 +19,7 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_nanoseconds
+from vergence_rig.regular_file import expanded
 from vergence_rig.rig import JOINT_NAMES
 from vergence_rig.rig_file import load_rig
 from vergence_servo.calibration import load_servos, servo_limits
@@ -67,7 +67,7 @@ class ServoNode(Node):
         try:
             if values.guardian:
                 self._guardians = Guardians(self._drivers, channels)
-            self._pose_file = Path(values.pose_file) if values.pose_file else default_pose_file()
+            self._pose_file = expanded(values.pose_file) if values.pose_file else default_pose_file()
             self._pose = read_pose(self._pose_file)
             self._head = ServoHead(
                 self._drivers.by_joint,

@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.geometry import EyeAngles, eye_direction
+from vergence_rig.picture_file import read_picture
+from vergence_rig.regular_file import FileError
 from vergence_rig.rig import CameraSpec
 from vergence_sim.photo.views import Padded, padded
 
@@ -176,13 +178,9 @@ def _read(side: str, path: str | Path) -> Image:
     if not str(path):
         raise PhotoError(f"the {side} photograph must be given: set the parameter '{side}' to the path of a picture")
     try:
-        encoded = np.frombuffer(Path(path).read_bytes(), np.uint8)
-    except OSError as error:
-        raise PhotoError(f"the {side} photograph '{path}' cannot be read: {error.strerror or error}") from error
-    image = cv2.imdecode(encoded, cv2.IMREAD_COLOR) if encoded.size else None
-    if image is None:
-        raise PhotoError(f"the {side} photograph '{path}' is not a picture that OpenCV can decode")
-    return np.asarray(image, np.uint8)
+        return read_picture(path)
+    except FileError as error:
+        raise PhotoError(f"the {side} photograph '{path}' {error}") from error
 
 
 def _size(image: Image) -> str:

@@ -24,13 +24,16 @@ from vergence_bringup.node_table import PHOTOGRAPHED
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir, environment
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
+from vergence_rig.regular_file import expanded
 from vergence_rig.rig import Rig
 from vergence_rig.rig_file import load_rig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the subcommand."""
-    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder of the report (default: out/demo)")
+    parser.add_argument(
+        "--out", type=expanded, default=Path("out/demo"), help="folder of the report (default: out/demo)"
+    )
     parser.add_argument(
         "--photos",
         nargs="*",
