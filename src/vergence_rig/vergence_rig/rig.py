@@ -153,8 +153,8 @@ class Joints:
 class Rig:
     """A binocular head: pan axes at y = +-baseline_m / 2 of `rig_base`, on top of one bar that tilts about y.
 
-    The tilt axis passes (tilt_axis_x_m, 0, tilt_axis_z_m). `zero_sigma_rad` is the standard deviation of each pan's zero
-    and yaw together: distances by the joints are as uncertain, and commands may diverge by as much.
+    The tilt axis passes (tilt_axis_x_m, 0, tilt_axis_z_m). `zero_sigma_rad` is the standard deviation of each pan's
+    zero and yaw together: distances by the joints are as uncertain, and commands may diverge by as much.
     """
 
     baseline_m: float = 0.065
