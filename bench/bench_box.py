@@ -5,7 +5,7 @@ Pairs are 640x480 with the simulator's noise, exposure and mounts, without lens 
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from vergence_metric.boxes.pair_geometry import PairGeometry
 from vergence_metric.boxes.parameters import BoxMetricParameters
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, from_version_vergence, gaze_for_point
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
+from vergence_sim.heads import rolled_head
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator, StereoFrame
 from vergence_sim.truth import TrueBox
@@ -30,7 +32,6 @@ ALIKE_SEEDS = range(980_000, 980_010)
 ALIKE_VIEWS = 100
 _SURFACE_RAYS = 24  # per side and eye; with the 6 of the live ground truth its own error would be 0.2 px
 _POINT_95 = 7.815  # of chi squared, three degrees of freedom
-_NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -100,10 +101,11 @@ def _cases(say: Callable[[str], None]) -> Iterator[Case]:
     for seed in WORLDS:
         rng = np.random.default_rng(seed)
         simulator = Simulator(
-            SimParameters.of({"world.seed": seed, "seed": seed, "servo": "ideal", "camera.distortion": _NO_DISTORTION}),
+            SimParameters.of({"world.seed": seed, "seed": seed, "servo": "ideal"}),
             rig,
+            head=replace(rolled_head(rig), left_camera=rig.left_camera, right_camera=rig.right_camera),
         )
-        measurement = BoxMeasurement(BoxMetricParameters(), rig.baseline_m)
+        measurement = BoxMeasurement(BoxMetricParameters(), Kinematics(rig))
         for number in range(VIEWS):
             distance = float(np.exp(rng.uniform(math.log(0.25), math.log(1.4))))
             point = distance * np.array([1.0, rng.uniform(-0.5, 0.5), rng.uniform(-0.35, 0.35)])
@@ -166,13 +168,13 @@ def _wrong_pairs(say: Callable[[str], None]) -> tuple[int, int]:
     rig = default_rig()
     cameras = CameraModel(rig.left_camera), CameraModel(rig.right_camera)
     parameters = BoxMetricParameters()
-    detector = BoxMeasurement(parameters, rig.baseline_m).detector
+    detector = BoxMeasurement(parameters, Kinematics(rig)).detector
     wrong = pairs = ambiguous = 0
     for seed in ALIKE_SEEDS:
         stage = Stage(seed)
         for view in stage.stereo_views(ALIKE_VIEWS, 2 + seed % 2):
             left, right = (detector.detect(image) for image in view.images)
-            geometry = PairGeometry(*cameras, EyeAngles(*view.angles_rad))
+            geometry = PairGeometry(*cameras, EyeAngles(*view.angles_rad), Kinematics(rig))
             found = associate(left.boxes(), right.boxes(), parameters.association, 0.0, view.images, geometry)
             for pair in found.pairs:
                 owners = [

@@ -76,7 +76,7 @@ def run(say: Callable[[str], None]) -> list[Row]:
 
 def _stages_ms(glance: Glance, case: Case) -> tuple[float, ...]:
     """Return the CPU time of each stage of a pair [ms], the mean over the pairs with a locked tracker."""
-    measurement, cameras = PairMeasurement(PairMeasurementParameters(), default_rig()), models()
+    measurement, camera = PairMeasurement(PairMeasurementParameters(), default_rig()), models()[0]
     spent_ms = []
     for number, (left, right) in enumerate(glance.pairs):
         stamp_s = 100.0 + number * _FRAME_S
@@ -89,7 +89,7 @@ def _stages_ms(glance: Glance, case: Case) -> tuple[float, ...]:
             disparity = measurement.disparity(edge)
             measurement.verged(edge, disparity.horizontal_px, disparity.confidence)
         marks.append(time.process_time())
-        measurement.track(edge, stamp_s, glance.eyes, cameras)
+        measurement.track(edge, stamp_s, glance.eyes, camera)
         marks.append(time.process_time())
         measurement.update_alignment()
         marks.append(time.process_time())

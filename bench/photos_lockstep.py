@@ -24,13 +24,14 @@ from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.ros import gaze_messages
 from vergence_metric.disparity.angular_disparity import angular_disparity
+from vergence_metric.edges.edges import to_grey
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import PairMeasurementParameters
+from vergence_metric.pairs.ideal_images import IdealImages
 from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_rig.camera import CameraModel
 from vergence_rig.joint_history import JointHistory
-from vergence_rig.rig import JOINT_NAMES, Rig
-from vergence_sim.optics import Lens
+from vergence_rig.rig import JOINT_NAMES, CameraSpec, Rig
 from vergence_sim.real_time import Schedule
 from vergence_sim.world import EYES, World
 
@@ -77,41 +78,41 @@ class Clickable(Protocol):
 class MetricOfPairs:
     """edge_metric_node's work on a pair, as the observations that gaze_controller_node makes of its messages."""
 
-    def __init__(self, rig: Rig, lenses: Mapping[str, Lens]) -> None:
+    def __init__(self, rig: Rig, calibrations: Mapping[str, CameraSpec | None]) -> None:
+        self._rig = rig
         self._measurement = PairMeasurement(PairMeasurementParameters(), rig)
-        left, right = (_model(lenses[eye]) for eye in EYES)
-        self._models = left, right
+        # Without a calibration the nodes take rig.yaml's cameras.
+        left, right = (CameraModel(calibrations[eye] or rig.camera(eye == "left")) for eye in EYES)
+        self._ideal = IdealImages(rig)
+        self.images = self._ideal.set_cameras((left, right))
+        """Both eyes' images, as their camera_info and the rig describe them."""
         self._joints = JointHistory()
-
-    @property
-    def left_camera(self) -> CameraModel:
-        """The left camera as its camera_info describes it."""
-        return self._models[0]
 
     def on_joints(self, stamp_s: float, angles_rad: Mapping[str, float]) -> None:
         """Keep a joint report."""
-        self._joints.add(_ns(stamp_s), list(angles_rad), list(angles_rad.values()))
+        angles = self._rig.eye_angles([angles_rad[name] for name in JOINT_NAMES])
+        self._joints.add(_ns(stamp_s), JOINT_NAMES, angles)
 
     def on_request(self, request: TrackRequest) -> None:
         """Pass the controller's request on to the tracker; it takes effect at the next pair, as in the node."""
-        self._measurement.request_track(track_request(gaze_messages.track_request(request, *self._models)))
+        self._measurement.request_track(track_request(gaze_messages.track_request(request, self.images), self.images))
 
     def observe(self, left: Image, right: Image, left_stamp_s: float, right_stamp_s: float) -> list[Observation]:
         """Measure a pair and return what the controller receives of it."""
         header = Header(stamp=to_stamp(left_stamp_s))
         skew_s = right_stamp_s - left_stamp_s
-        measurement, models = self._measurement, self._models
-        edge = measurement.edge(left, right)
+        measurement, camera = self._measurement, self.images[0].ideal
+        edge = measurement.edge(*self._ideal.draw(to_grey(left), to_grey(right)))
         now_ns = _ns(left_stamp_s)
         eyes = self._joints.at(now_ns, _ns(right_stamp_s))
         passed = self._joints.samples_between(now_ns - _LOOK_BACK_NS, now_ns)
-        track = measurement.track(edge, left_stamp_s, eyes, models, [(ns * 1e-9, angles) for ns, angles in passed])
-        angular = angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
-        tracked = track_message(track, edge, angular, header, skew_s)
+        track = measurement.track(edge, left_stamp_s, eyes, camera, [(ns * 1e-9, angles) for ns, angles in passed])
+        angular = angular_disparity(camera, camera, track.left_px, track.disparity_px, track.vertical_px)
+        tracked = track_message(track, edge, angular, self.images, header, skew_s)
         measurement.update_alignment()
         return [
             gaze_messages.track_contrast(tracked),
-            gaze_messages.track_sighting(tracked, models[0]),
+            gaze_messages.track_sighting(tracked, self.images[0]),
         ]
 
 
@@ -121,7 +122,7 @@ class Lockstep:
     def __init__(self, world: World, rig: Rig, parameters: GazeParameters | None = None) -> None:
         self.world = world
         self.controller = GazeController(rig, parameters or gaze_parameters(), CONTROL_PERIOD_S)
-        self.metric = MetricOfPairs(rig, world.lenses)
+        self.metric = MetricOfPairs(rig, world.calibrations)
         self.on_step: Callable[[Any], None] = lambda command: None
         self.newest_exposure_s = -math.inf
         """When the left image of the newest pair that was measured was exposed."""
@@ -145,7 +146,7 @@ class Lockstep:
 
     def click(self, pixel: tuple[float, float]) -> int:
         """Ask the controller to look at a pixel (x, y) of the newest left image that was published."""
-        x, y = self.metric.left_camera.undistort([pixel])[0]
+        x, y = self.metric.images[0].undistort([pixel])[0]
         goal = Goal(
             GoalKind.PIXEL,
             left_eye=True,
@@ -228,12 +229,6 @@ def record(lockstep: Lockstep, point: Clickable, duration_s: float, rest_s: floa
     while world.time_s < began_s + duration_s - 1e-9 and world.time_s - began_s - verged_since_s < rest_s:
         lockstep.advance_to(world.time_s + CONTROL_PERIOD_S)
     return trace
-
-
-def _model(lens: Lens) -> CameraModel:
-    camera = lens.camera
-    matrix = [camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0]
-    return CameraModel.from_camera_info_values(camera.width_px, camera.height_px, matrix, lens.distortion)
 
 
 def clock_s(world_s: float) -> float:

@@ -50,10 +50,11 @@ from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.registry import make_tracker
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
 camera = CameraModel(default_rig().left_camera)
 parameters = TrackerParameters(kind="fixed_template")
-tracker = make_tracker(parameters, make_estimator(DisparityParameters()), camera, camera, 0.065)
+tracker = make_tracker(parameters, make_estimator(DisparityParameters()), camera, Kinematics(default_rig()))
 texture = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 255, (520, 720)).astype(np.uint8), (0, 0), 2.5)
 eyes = EyeAngles(0.0, 0.0, 0.0)
 first = tracker.update(texture[20:500, 30:670], texture[20:500, 38:678], 1.0, eyes)

@@ -14,6 +14,7 @@ setup(
         ("bin", ["scripts/vergence"]),  # colcon puts this folder on the PATH
         ("share/vergence_bringup/systemd", glob("systemd/*")),
         ("share/vergence_bringup/urdf", glob("urdf/*")),
+        ("share/vergence_bringup/mjcf", glob("mjcf/*")),
     ],
     package_data={"vergence_bringup": ["py.typed"]},
     install_requires=["setuptools"],

@@ -20,6 +20,7 @@ from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.ros.box_metric_node import BoxMetricNode
 from vergence_msgs.msg import BoxVergence, DetectorClasses, StereoDetections
 from vergence_rig.parameters import RenamedParameterError
+from vergence_rig.rig import default_rig
 
 onnx = pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
 TensorProto, helper, numpy_helper = onnx.TensorProto, onnx.helper, onnx.numpy_helper
@@ -144,8 +145,8 @@ def test_a_pair_gives_metric_ii_with_the_left_stamp(graph: Any, node: BoxMetricN
     assert message.left_minus_right_top_left_y_px == 0.0
     assert message.center_horizontal_px == 16.0
     assert message.size_ratio == 1.0
-    assert math.isnan(message.center_horizontal_rad)
-    assert math.isnan(message.left_azimuth_rad)
+    focal_px = default_rig().left_camera.fx_px * WIDTH / 640  # no camera_info: the rig's description is used
+    assert message.center_horizontal_rad == pytest.approx(16.0 / focal_px, rel=0.05)
 
 
 def test_with_cameras_and_joints_it_is_placed_in_space(graph: Any, node: BoxMetricNode) -> None:

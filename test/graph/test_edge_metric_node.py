@@ -19,6 +19,7 @@ from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_metric.measurement.edge_metric import EdgeMetric
 from vergence_metric.ros.edge_metric_node import EdgeMetricNode
 from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
+from vergence_rig.rig import default_rig
 
 pytestmark = pytest.mark.graph
 
@@ -126,14 +127,25 @@ def test_a_pair_gives_the_pure_metric_and_the_shift_with_the_left_stamp(graph: A
         assert message.pair_skew_s == pytest.approx(0.003)
 
 
-def test_angles_are_nan_until_the_cameras_are_described(graph: Any, eyes: Eyes) -> None:
-    left, right = view(0), view(7)
-    _, error, track = answers(graph, eyes, left, right)
+def test_angles_are_nan_where_nothing_describes_the_cameras(graph: Any, eyes: Eyes) -> None:
+    _, error, track = answers(graph, eyes, view(0, 320, 200), view(7, 320, 200))
     assert error.status == VergenceError.STATUS_NO_CAMERA_INFO
     assert math.isnan(error.horizontal_rad)
     assert math.isnan(error.vertical_rad)
     assert math.isnan(track.disparity_rad)
     assert "camera_info" in error.reason
+    status = graph.diagnostic("cameras", lambda s: s.level == DiagnosticStatus.ERROR)
+    assert has(status, "rig.yaml describes another image shape too")
+
+
+def test_without_calibration_the_rigs_description_is_used(graph: Any, eyes: Eyes) -> None:
+    left, right = view(0), view(7)
+    _, error, _ = answers(graph, eyes, left, right)
+    assert error.status == VergenceError.STATUS_OK
+    focal_px = 0.5 * default_rig().left_camera.fx_px  # the rig's images are twice as large
+    assert error.horizontal_rad == pytest.approx(math.atan(7 / focal_px), abs=0.1 / focal_px)
+    status = graph.diagnostic("cameras", lambda s: s.level == DiagnosticStatus.WARN)
+    assert status.message == "left/camera_info: no message yet; rig.yaml's description of the camera is used"
     eyes.describe()
     status = graph.diagnostic("cameras", lambda s: s.level == DiagnosticStatus.OK)
     assert has(status, "both cameras")
@@ -147,9 +159,9 @@ def test_angles_are_nan_until_the_cameras_are_described(graph: Any, eyes: Eyes) 
 def test_camera_info_of_another_size_is_named_and_not_used(graph: Any, eyes: Eyes) -> None:
     eyes.describe(640, 480)
     _, error, _ = answers(graph, eyes, view(0), view(7))
-    assert error.status == VergenceError.STATUS_NO_CAMERA_INFO
+    assert error.status == VergenceError.STATUS_OK
     status = graph.diagnostic("cameras", lambda s: s.level == DiagnosticStatus.ERROR)
-    assert status.message == "left/camera_info must be for 320x240 images: got 640x480; angles are NaN"
+    assert has(status, "left/camera_info: must be for 320x240 images: got 640x480; rig.yaml's description")
 
 
 def test_an_image_without_edges_gives_nan_and_a_status(graph: Any, eyes: Eyes) -> None:
@@ -202,11 +214,19 @@ def test_a_wrong_image_is_named_counted_and_survived(
 
 
 def test_images_of_different_size_are_named_and_survived(graph: Any, eyes: Eyes) -> None:
-    eyes.show(view(0), view(0, 160, 120))
+    eyes.show(view(0), view(0, 160, 100))
     status = graph.diagnostic("pairs", lambda s: s.level == DiagnosticStatus.ERROR)
-    assert status.message == "left and right images must have one size: got 320x240 and 160x120"
+    assert has(status, "cameras without calibration must have one size: got 320x240 and 160x100")
     assert values(status)["size_mismatches"] == "1"
     answers(graph, eyes, view(0), view(7))
+
+
+def test_cameras_of_two_sizes_are_measured_as_one(graph: Any, eyes: Eyes) -> None:
+    small = cv2.resize(view(7), (160, 120), interpolation=cv2.INTER_AREA)
+    _, error, _ = answers(graph, eyes, view(0), small)
+    assert error.status == VergenceError.STATUS_OK
+    focal_px = 0.5 * default_rig().left_camera.fx_px
+    assert error.horizontal_rad == pytest.approx(math.atan(7 / focal_px), abs=0.5 / focal_px)
 
 
 def test_no_right_camera_is_named(graph: Any) -> None:
@@ -357,7 +377,7 @@ def test_a_request_is_answered_with_its_goals_id(graph: Any, node: EdgeMetricNod
     requests = graph.client.create_publisher(TrackRequest, "vergence/track_request", 10)
     graph.wait_until(lambda: requests.get_subscription_count() > 0, "the node subscribes to requests")
     eyes.describe()
-    graph.wait_until(lambda: node._stereo.models_for(view(0)) is not None, "the cameras are known")
+    graph.wait_until(lambda: all(node._stereo.models), "the cameras are known")
 
     def publish_joints() -> None:
         stamp = from_nanoseconds(eyes.stamp_ns + 33 * MS)

@@ -154,6 +154,20 @@ def test_moves_are_recorded_and_the_head_is_left_where_it_was(start: Start, comp
     assert (owners.servos.name, owners.servos.value_s) == ("/pale_head", 0.015)
 
 
+def test_the_head_looks_from_a_pose_and_returns(start: Start) -> None:
+    node = start(PaleHead)
+    with IdentifiedHead(default_rig(), timeout_s=TIMEOUT_S) as head:
+        head.begin()
+        commanded = {"pan_left": -0.05, "pan_right": 0.12, "tilt": 0.02}
+        look = head.look(commanded)
+        assert node.position == pytest.approx(commanded)
+    assert look.joints_rad == pytest.approx(list(commanded.values()))
+    for eye in EYES:
+        assert look.pictures[eye].shape == (48, 64)
+        assert look.sizes_px[eye] == (64, 48)
+    assert node.position == pytest.approx({"pan_left": -0.1, "pan_right": 0.1, "tilt": 0.05})
+
+
 @pytest.mark.parametrize("before", ["idle", "verging", "disabled"])
 def test_a_controller_is_silenced_and_gets_its_way_back(start: Start, before: str) -> None:
     node = start(PaleHead)

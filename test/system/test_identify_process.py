@@ -47,7 +47,7 @@ def test_a_simulated_heads_latencies_and_gains_are_written(processes: ProcessGro
     start_head(processes)
     out = tmp_path / "rig.yaml"
     out.write_text("baseline_m: 0.07\n")
-    options = ("--rig", str(out), "--axes", "tilt", "--rest-s", "1.0", "--steps", "10")
+    options = ("--only", "timing", "--rig", str(out), "--axes", "tilt", "--rest-s", "1.0", "--steps", "10")
     shown, errors = identify(out, *options).communicate(timeout=380)
     assert "wrote" in shown, shown + errors
     rig = load_rig(out)

@@ -220,7 +220,7 @@ def test_the_heads_frames_are_published_where_that_is_possible(file, monkeypatch
         nodes(file, frames="true")
     monkeypatch.setattr(launch_actions, "_installed", lambda package: True)
     given = dict(nodes(file, rig=str(rig)))["robot_state_publisher"]
-    assert 'xyz="0 0.04 0"' in given["robot_description"]
+    assert 'xyz="0.0 0.04 0.0"' in given["robot_description"]
     assert "robot_state_publisher" not in dict(nodes(file, frames="false"))
 
 

@@ -15,7 +15,7 @@ COMMANDS = {
     "calibrate": ("vergence_bringup.commands.calibrate", "calibrate the cameras from chessboard or ChArUco views"),
     "identify": (
         "vergence_calibration.ros.identify",
-        "measure latencies, pixels per radian and signs of a running head and write them to YAML",
+        "measure timing and geometry of a running head and write them to YAML",
     ),
     "look": ("vergence_bringup.ros.look", "look at a pixel, a class, a point or by angles, and say whether it verged"),
     "watch": ("vergence_bringup.ros.watch", "show a running graph in the terminal"),

@@ -22,7 +22,7 @@ from vergence_calibration.identification.axis_log import (
     Move,
 )
 from vergence_calibration.identification.identification import Identification, identify
-from vergence_calibration.identification.identified_rig import identified_rig, nodes_text, rig_text
+from vergence_calibration.identification.identified_rig import identified_rig, nodes_text, record, rig_text
 from vergence_calibration.identification.pose import pose_with_room
 from vergence_calibration.identification.seen_motion import shrunk, shrunk_camera
 from vergence_gaze.control.controller import GazeController
@@ -267,7 +267,7 @@ def test_the_file_is_read_back_and_the_controller_looks_further_ahead_with_it(tm
     path = tmp_path / "rig.yaml"
     path.write_text("baseline_m: 0.07\n")
     rig = identified_rig(load_rig(path), found)
-    kept = replace_file(path, rig_text(rig, found, "now"))
+    kept = replace_file(path, rig_text(rig, record(found), "now"))
     assert kept is not None
     assert kept.read_text() == "baseline_m: 0.07\n"
     again = load_rig(path)

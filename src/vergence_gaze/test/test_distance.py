@@ -9,9 +9,11 @@ from vergence_gaze.estimation.distance import joint_variances, target_position
 from vergence_gaze.estimation.target_filter import TargetEstimate
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_rig.geometry import gaze_for_point
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
 
 RIG = default_rig()
+HEAD = Kinematics(RIG)
 NOTHING = np.zeros(3)
 
 
@@ -23,7 +25,7 @@ def estimate(distance_m: float, sigma_rad: float = 1e-4) -> TargetEstimate:
 
 def test_half_a_degree_is_13_cm_at_one_metre() -> None:
     variances = np.array([0.5, 0.5, 0.0]) * math.radians(0.5) ** 2  # together half a degree of vergence
-    position = target_position(estimate(1.0), RIG, variances)
+    position = target_position(estimate(1.0), HEAD, variances)
     assert position.distance_m == pytest.approx(1.0, abs=1e-6)
     assert math.sqrt(position.covariance_m2[0, 0]) == pytest.approx(0.134, abs=0.002)
 
@@ -31,33 +33,33 @@ def test_half_a_degree_is_13_cm_at_one_metre() -> None:
 def test_covariance_agrees_with_sampling() -> None:
     random, variances = np.random.default_rng(1), joint_variances(RIG)
     centre = estimate(0.6)
-    stated = target_position(centre, RIG, variances).covariance_m2
+    stated = target_position(centre, HEAD, variances).covariance_m2
     points = []
     for left, right, tilt in random.normal(0.0, np.sqrt(variances), (4000, 3)):
         angles = centre.angles_rad + np.array([0.5 * (left + right), right - left, tilt])
-        points.append(target_position(TargetEstimate(angles, NOTHING, np.eye(3) * 1e-12, False), RIG, NOTHING).point_m)
+        points.append(target_position(TargetEstimate(angles, NOTHING, np.eye(3) * 1e-12, False), HEAD, NOTHING).point_m)
     np.testing.assert_allclose(np.diag(stated), np.var(points, axis=0), rtol=0.15)
 
 
 def test_parallel_axes_cannot_be_excluded_far_away() -> None:
-    position = target_position(estimate(40.0), RIG, joint_variances(RIG))
+    position = target_position(estimate(40.0), HEAD, joint_variances(RIG))
     assert math.isinf(position.high_m)
     assert position.low_m < 40.0
     assert (
-        target_position(TargetEstimate(NOTHING, NOTHING, np.eye(3) * 1e-8, False), RIG, NOTHING).distance_m == math.inf
+        target_position(TargetEstimate(NOTHING, NOTHING, np.eye(3) * 1e-8, False), HEAD, NOTHING).distance_m == math.inf
     )
 
 
 def test_the_visual_encoder_narrows_the_interval_until_a_pan_moves() -> None:
     variances = joint_variances(RIG)
     offset = VergenceOffset(variances)
-    before = target_position(estimate(1.0), RIG, variances, offset)
+    before = target_position(estimate(1.0), HEAD, variances, offset)
     for i in range(20):
         assert offset.update(1.0 + i, 0.002, 0.0004)
-    after = target_position(estimate(1.0), RIG, variances, offset)
+    after = target_position(estimate(1.0), HEAD, variances, offset)
     assert offset.offset_rad == pytest.approx(0.002, rel=0.15)
     assert after.high_m - after.low_m < 0.6 * (before.high_m - before.low_m)
     assert after.distance_m < before.distance_m  # converging more than the joints say is nearer
     offset.on_pan_moved(100.0)
     assert not offset.update(99.0, 0.002, 0.0004)
-    assert target_position(estimate(1.0), RIG, variances, offset).distance_m == pytest.approx(before.distance_m)
+    assert target_position(estimate(1.0), HEAD, variances, offset).distance_m == pytest.approx(before.distance_m)

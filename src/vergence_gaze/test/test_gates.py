@@ -29,6 +29,7 @@ from vergence_gaze.joints.joint_moves import JointMoves
 from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.target_parameters import TargetParameters
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
 
 P = TargetParameters()
@@ -101,8 +102,12 @@ def test_an_exposure_while_the_eyes_turn_is_refused() -> None:
     assert gate.check(sighting(joints(0, HERE), 1.1), None).accepted
 
 
+def requested_point() -> RequestedPoint:
+    return RequestedPoint(1, joints(0.0, HERE), Kinematics(default_rig()), P, 2.0)
+
+
 def test_what_lies_beside_or_behind_a_requested_point_is_refused() -> None:
-    gate = PointGate(RequestedPoint(1, joints(0.0, HERE), P, 2.0))
+    gate = PointGate(requested_point())
     assert gate.check(sighting(joints(0.005, HERE)), None).accepted
     assert "beside it" in gate.check(sighting(joints(0.05, HERE)), None).reason
     assert "vergence" in gate.check(sighting(joints(0.5 * (FAR - HERE), FAR)), None).reason
@@ -208,7 +213,11 @@ odd = st.one_of(st.floats(-3, 3), st.just(math.nan))
 
 @given(st.lists(odd, min_size=3, max_size=3), odd, st.sampled_from(["track", "box"]), st.booleans())
 def test_a_refusal_always_says_why(seen: list[float], extent_rad: float, source: str, moving: bool) -> None:
-    gates: list[Gate] = [ClassGate(P), JumpGate(P), PointGate(RequestedPoint(1, joints(0.0, HERE), P, 2.0))]
+    gates: list[Gate] = [
+        ClassGate(P),
+        JumpGate(P),
+        PointGate(requested_point()),
+    ]
     for gate in gates:
         verdict = gate.check(sighting(np.array(seen), 1.0, source, extent_rad), estimate(moving=moving))
         assert verdict.accepted or verdict.reason
@@ -219,7 +228,7 @@ def test_the_tracking_reports_the_reason_of_the_gate_that_refused() -> None:
     history = ShaftHistory(rig)
     for stamp_s in (0.9, 1.0, 1.1):
         history.add(stamp_s, {"pan_left": -0.04, "pan_right": 0.04, "tilt": 0.0})
-    tracking = TargetTracking(rig, parameters, history, JointMoves(rig, history))
+    tracking = TargetTracking(Kinematics(rig), parameters, history, JointMoves(rig, history))
     tracking.request_target(1.0, 1.0, np.array([0.0, HERE, 0.0]), np.eye(3) * 1e-6, 3)
     assert tracking.update_track(replace(TRACK, stamp_s=1.05), 1.1)
     assert not tracking.update_track(replace(TRACK, stamp_s=1.06, goal_id=2), 1.1)

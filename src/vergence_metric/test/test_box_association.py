@@ -19,6 +19,7 @@ from vergence_metric.boxes.parameters import AssociationParameters, FollowParame
 from vergence_metric.boxes.patch_descriptor import descriptor_correlation, patch_descriptor
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
 
 P = AssociationParameters()
@@ -34,7 +35,9 @@ def box(x, y, width=60.0, height=60.0, score=0.8, class_id=0, cut=(False,) * 4):
 
 def geometry(eyes=None):
     rig = default_rig()
-    return PairGeometry(CameraModel(rig.left_camera), CameraModel(rig.right_camera), eyes or EyeAngles(0.0, 0.0, 0.0))
+    return PairGeometry(
+        CameraModel(rig.left_camera), CameraModel(rig.right_camera), eyes or EyeAngles(0.0, 0.0, 0.0), Kinematics(rig)
+    )
 
 
 def test_the_best_score_is_not_the_partner():

@@ -17,10 +17,12 @@ from vergence_metric.boxes.smoothing import LagLimitedFilter
 from vergence_metric.boxes.target_point import locate
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
 
 CAMERAS = (CameraModel(default_rig().left_camera), CameraModel(default_rig().right_camera))
 BASELINE_M = 0.065
+HEAD = Kinematics(default_rig())
 
 
 def scene(x, y=1, width=128, height=96, red=255):
@@ -33,7 +35,7 @@ def scene(x, y=1, width=128, height=96, red=255):
 @pytest.fixture
 def measurement(onnx_model):
     path = str(onnx_model("yolov6", classes=1, names='{"0": "cube"}'))
-    return BoxMeasurement(BoxMetricParameters(DetectorParameters(model=path, threshold=0.5)), BASELINE_M)
+    return BoxMeasurement(BoxMetricParameters(DetectorParameters(model=path, threshold=0.5)), HEAD)
 
 
 def test_a_pair_in_both_eyes(measurement):
@@ -259,7 +261,7 @@ def test_a_point_is_found_where_it_is(x, y, z, off):
     for pan, side in ((eyes.pan_left_rad, 1), (eyes.pan_right_rad, -1)):
         local = rotation_rig_from_optical(pan, eyes.tilt_rad).T @ (point - [0, side * BASELINE_M / 2, 0])
         pixels.append(tuple(CAMERAS[0].ray_to_pixel(local[None])[0]))
-    found = locate(pixels[0], pixels[1], CAMERAS, eyes, BASELINE_M, (1.0, 0.5, 0.002))
+    found = locate(pixels[0], pixels[1], CAMERAS, eyes, HEAD, (1.0, 0.5, 0.002))
     assert found is not None
     np.testing.assert_allclose(found.point_m, point, atol=1e-6)
     assert (np.linalg.eigvalsh(found.covariance_m2) > 0).all()
@@ -270,7 +272,7 @@ def test_covariance_is_what_repeated_noise_gives():
     eyes = gaze_for_point(point, BASELINE_M)
     center = (319.5, 239.5)
     sigmas = (0.8, 0.4, 0.001)
-    found = locate(center, center, CAMERAS, eyes, BASELINE_M, sigmas)
+    found = locate(center, center, CAMERAS, eyes, HEAD, sigmas)
     assert found is not None
     rng = np.random.default_rng(5)
     samples = []
@@ -279,7 +281,7 @@ def test_covariance_is_what_repeated_noise_gives():
         d, joints = rng.normal(0, sigmas[1]), rng.normal(0, sigmas[2], 3)
         moved = EyeAngles(eyes.pan_left_rad + joints[0], eyes.pan_right_rad + joints[1], eyes.tilt_rad + joints[2])
         left, right = (center[0] + u, center[1] + v), (center[0] + u - d, center[1] + v)
-        sample = locate(left, right, CAMERAS, moved, BASELINE_M, (1e-3, 1e-3, 1e-6))
+        sample = locate(left, right, CAMERAS, moved, HEAD, (1e-3, 1e-3, 1e-6))
         assert sample is not None
         samples.append(sample.point_m)
     spread = np.cov(np.array(samples).T)
@@ -287,4 +289,4 @@ def test_covariance_is_what_repeated_noise_gives():
 
 
 def test_a_point_behind_the_eyes_is_none():
-    assert locate((300, 240), (340, 240), CAMERAS, EyeAngles(0.0, 0.0, 0.0), BASELINE_M, (1, 1, 0.001)) is None
+    assert locate((300, 240), (340, 240), CAMERAS, EyeAngles(0.0, 0.0, 0.0), HEAD, (1, 1, 0.001)) is None

@@ -19,6 +19,7 @@ from vergence_metric.tracking.track import TrackStatus
 from vergence_metric.tracking.tracker import TargetTracker
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, eye_position, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
 
 RIG = default_rig()
@@ -78,7 +79,7 @@ class Stage:
     def __init__(self, **parameters):
         cv2.setRNGSeed(1)
         estimator = make_estimator(DisparityParameters())
-        self.tracker = TargetTracker(TrackerParameters(**parameters), estimator, CAMERA, CAMERA, RIG.baseline_m)
+        self.tracker = TargetTracker(TrackerParameters(**parameters), estimator, CAMERA, Kinematics(RIG))
         self.memory, self.stamp_s = PairMemory(1.0), 0.0
 
     def show(self, eyes, reported=None, board_m=BOARD_M):

@@ -13,6 +13,7 @@ from vergence_metric.tracking.track import TrackStatus
 from vergence_metric.tracking.tracker import TargetTracker
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, eye_position, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
 
 RIG = default_rig()
@@ -56,7 +57,7 @@ class Stage:
 
     def __init__(self):
         self.tracker = TargetTracker(
-            TrackerParameters(), make_estimator(DisparityParameters()), CAMERA, CAMERA, RIG.baseline_m
+            TrackerParameters(), make_estimator(DisparityParameters()), CAMERA, Kinematics(RIG)
         )
         self.frame, self.rng = 0, np.random.default_rng(0)
         self.tracks, self.errors = [], []
@@ -271,7 +272,7 @@ def test_a_saccade_towards_the_target_keeps_it(stage):
 def test_a_target_that_stays_away_is_given_up_until_the_next_saccade():
     stage = Stage()
     stage.tracker = TargetTracker(
-        TrackerParameters(give_up_s=0.3), make_estimator(DisparityParameters()), CAMERA, CAMERA, RIG.baseline_m
+        TrackerParameters(give_up_s=0.3), make_estimator(DisparityParameters()), CAMERA, Kinematics(RIG)
     )
     target = (0.8, 0.0, 0.0)
     stage.lock(target, gaze(target))

@@ -1,7 +1,6 @@
 """Kinematics: inverse and forward agree, Jacobians are those of differences, the ideal head is a special case."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,9 @@ from hypothesis import strategies as st
 
 from vergence_rig import geometry as g
 from vergence_rig.kinematics import FarPoint, Kinematics
-from vergence_rig.rig import EyeMount, Joints, Rig, RigError, default_rig
+from vergence_rig.rig import Rig, RigError, default_rig
 from vergence_rig.rig_file import rig_as_mapping, rig_from_mapping
+from vergence_rig.testing.odd_heads import SHARES, odd_head
 
 _STEP = 1e-6
 
@@ -21,34 +21,11 @@ def _between(limit: float, about: float = 0.0) -> st.SearchStrategy[float]:
     return st.floats(about - limit, about + limit)
 
 
-_MOUNTS = st.builds(
-    EyeMount,
-    axis_x_m=_between(0.01),
-    axis_z_m=_between(0.003),
-    lens_x_m=_between(0.04),
-    lens_y_m=_between(0.005),
-    lens_z_m=_between(0.003),
-    roll_rad=_between(0.1),
-    pitch_rad=_between(0.08),
-    yaw_rad=_between(0.1),
-)
+_RIGS = st.lists(st.floats(-1.0, 1.0), min_size=SHARES, max_size=SHARES).map(odd_head)
 _POINTS = st.tuples(st.floats(0.25, 3.0), _between(0.4), _between(0.4))
 
 
-@st.composite
-def _rigs(draw: Any) -> Rig:
-    rig = Rig(
-        baseline_m=draw(st.floats(0.05, 0.15)),
-        left_mount=draw(_MOUNTS),
-        right_mount=draw(_MOUNTS),
-        tilt_axis_x_m=draw(_between(0.03)),
-        tilt_axis_z_m=draw(_between(0.05)),
-    )
-    joints = [replace(j, zero_rad=draw(_between(0.1)), scale=draw(_between(0.1, 1.0))) for _, j in rig.joints.items()]
-    return replace(rig, joints=Joints(*joints))
-
-
-@given(_rigs(), _POINTS)
+@given(_RIGS, _POINTS)
 def test_both_eyes_look_at_the_point_that_they_are_turned_to(rig: Rig, point: tuple[float, float, float]) -> None:
     k = Kinematics(rig)
     eyes = k.gaze_for_point(point)
@@ -63,7 +40,7 @@ def test_both_eyes_look_at_the_point_that_they_are_turned_to(rig: Rig, point: tu
     assert downs[0] - downs[1] == pytest.approx(k.vertical_difference_rad(point), abs=1e-4)
 
 
-@given(_rigs(), _POINTS)
+@given(_RIGS, _POINTS)
 def test_forward_and_inverse_agree(rig: Rig, point: tuple[float, float, float]) -> None:
     k = Kinematics(rig)
     eyes = k.gaze_for_point(point)
@@ -71,7 +48,7 @@ def test_forward_and_inverse_agree(rig: Rig, point: tuple[float, float, float]) 
     assert k.fixation(eyes).point_m == pytest.approx(point, abs=2e-3)
 
 
-@given(_rigs(), _between(0.4), _between(0.3), st.floats(-0.05, 3.0))
+@given(_RIGS, _between(0.4), _between(0.3), st.floats(-0.05, 3.0))
 def test_far_points_are_found_through_infinity(rig: Rig, y: float, z: float, w: float) -> None:
     k = Kinematics(rig)
     eyes = k.gaze(FarPoint(1.0, y, z, w))
@@ -83,7 +60,7 @@ def test_far_points_are_found_through_infinity(rig: Rig, y: float, z: float, w: 
     )
 
 
-@given(_rigs(), _POINTS)
+@given(_RIGS, _POINTS)
 def test_jacobian_of_the_point_is_that_of_differences(rig: Rig, point: tuple[float, float, float]) -> None:
     k = Kinematics(rig)
     eyes = k.gaze_for_point(point)
@@ -93,7 +70,7 @@ def test_jacobian_of_the_point_is_that_of_differences(rig: Rig, point: tuple[flo
     assert k.point_jacobian(eyes) == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
 
 
-@given(_rigs(), st.booleans(), _between(0.8), _between(0.6))
+@given(_RIGS, st.booleans(), _between(0.8), _between(0.6))
 def test_jacobian_of_the_pose_is_that_of_differences(rig: Rig, left: bool, pan: float, tilt: float) -> None:
     k = Kinematics(rig)
     moves, turns = k.pose_jacobian(left, pan, tilt)
@@ -117,7 +94,7 @@ def test_a_head_without_offsets_has_the_formulas_of_ideal_eyes(
     assert k.axis(eyes.pan_left_rad, eyes.tilt_rad) == pytest.approx(g.eye_direction(eyes.pan_left_rad, eyes.tilt_rad))
 
 
-@given(_rigs(), _between(0.5), _between(0.5), _between(0.4))
+@given(_RIGS, _between(0.5), _between(0.5), _between(0.4))
 def test_eye_angles_describe_the_same_head(rig: Rig, left: float, right: float, tilt: float) -> None:
     joints = (left, right, tilt)
     eyes = rig.eye_angles(joints)
@@ -139,7 +116,7 @@ def test_eye_angles_describe_the_same_head(rig: Rig, left: float, right: float, 
     )
 
 
-@given(_rigs())
+@given(_RIGS)
 def test_a_rig_with_mounts_is_written_and_read(rig: Rig) -> None:
     assert rig_from_mapping(rig_as_mapping(rig)) == rig
 

@@ -47,6 +47,19 @@ class EyeImage:
             return np.atleast_2d(np.asarray(pixels, dtype=np.float64))
         return self.camera.ray_to_pixel(self.ideal.pixel_to_ray(pixels) @ self._turn.T)
 
+    @property
+    def fx_px(self) -> float:
+        """Focal length of the ideal camera [px]."""
+        return self.ideal.fx_px
+
+    def undistort(self, pixels: npt.ArrayLike) -> Array:
+        """Return normalised coordinates (N, 2), x right, y down, in the ideal camera of the camera's pixels (N, 2)."""
+        return self.ideal.undistort(self.to_ideal(pixels))
+
+    def distort(self, normalised: npt.ArrayLike) -> Array:
+        """Return the camera's pixels (N, 2) of normalised coordinates (N, 2) in the ideal camera."""
+        return self.to_camera(self.ideal.distort(normalised))
+
     def maps(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Return the camera's x and y (h, w) of every pixel of the ideal image, for cv2.remap."""
         shape = (self.ideal.height_px, self.ideal.width_px)
@@ -54,6 +67,19 @@ class EyeImage:
         found = self.to_camera(np.column_stack([columns.ravel(), rows.ravel()]))
         placed = np.nan_to_num(found, nan=_OUTSIDE_PX).astype(np.float32).reshape(*shape, 2)
         return np.ascontiguousarray(placed[:, :, 0]), np.ascontiguousarray(placed[:, :, 1])
+
+
+def described_camera(spec: CameraSpec, width_px: int, height_px: int) -> CameraModel | None:
+    """Return the camera that a rig describes, for images of this size; None where their shape is another.
+
+    A camera delivers its image in several sizes: intrinsics are proportional to it.
+    """
+    if width_px * spec.height_px != height_px * spec.width_px or width_px < 1:
+        return None
+    scale = width_px / spec.width_px
+    focal = (spec.fx_px * scale, spec.fy_px * scale)
+    centre = ((spec.cx_px + 0.5) * scale - 0.5, (spec.cy_px + 0.5) * scale - 0.5)
+    return CameraModel(CameraSpec(width_px, height_px, *focal, *centre, spec.distortion))
 
 
 def eye_images(rig: Rig, cameras: tuple[CameraModel, CameraModel]) -> tuple[EyeImage, EyeImage]:

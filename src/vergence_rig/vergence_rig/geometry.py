@@ -101,9 +101,10 @@ ROTATION_EYE_FROM_OPTICAL: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], 
 """Optical frame (x right, y down, z forward) to eye frame (x forward, y left, z up)."""
 
 
-def rotation_rig_from_optical(pan_rad: float, tilt_rad: float) -> Array:
-    """Return the rotation (3, 3) from an eye's optical frame to rig_base."""
-    return rotation_rig_from_eye(pan_rad, tilt_rad) @ ROTATION_EYE_FROM_OPTICAL
+def rotation_rig_from_optical(pan_rad: float, tilt_rad: float, pitch_rad: float = 0.0) -> Array:
+    """Return the rotation (3, 3) from the optical frame of an eye, pitched on its pan axis, to rig_base."""
+    turned = rotation_rig_from_eye(pan_rad, tilt_rad)
+    return (turned @ rotation_rig_from_eye(0.0, pitch_rad) if pitch_rad else turned) @ ROTATION_EYE_FROM_OPTICAL
 
 
 def angles_of_direction(direction: Any) -> tuple[float, float]:
@@ -179,6 +180,12 @@ def fixation_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direction_b
     """Return the midpoint of closest approach of two rays and their distance. Raises as `nearest_points_of_rays`."""
     nearest_a, nearest_b = nearest_points_of_rays(origin_a, direction_a, origin_b, direction_b)
     return Fixation(0.5 * (nearest_a + nearest_b), float(np.linalg.norm(nearest_b - nearest_a)))
+
+
+def angle_between(a: Any, b: Any) -> float:
+    """Return the angle between two directions (3,) of any length [rad], exact for small ones too."""
+    first, second = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    return math.atan2(float(np.linalg.norm(_cross(first, second))), float(first @ second))
 
 
 def check_converging(vergence_rad: float) -> None:

@@ -26,6 +26,7 @@ from vergence_rig.geometry import (
     check_converging,
     fixation_of_rays,
     rotation_rig_from_eye,
+    rotation_rig_from_optical,
 )
 from vergence_rig.rig import EyeMount, Rig
 
@@ -107,7 +108,7 @@ class Kinematics:
 
     def rotation_rig_from_optical(self, pan_rad: float, tilt_rad: float) -> Array:
         """Return the rotation (3, 3) from an eye's optical frame (x right, y down, z forward) to rig_base."""
-        return self.rotation_rig_from_eye(pan_rad, tilt_rad) @ ROTATION_EYE_FROM_OPTICAL
+        return rotation_rig_from_optical(pan_rad, tilt_rad, self.pitch_rad)
 
     def rotation_rig_from_camera(self, left: bool, pan_rad: float, tilt_rad: float) -> Array:
         """Return the rotation (3, 3) from the optical frame of a camera with its own roll and pitch to rig_base."""

@@ -153,7 +153,8 @@ class Joints:
 class Rig:
     """A binocular head: pan axes at y = +-baseline_m / 2 of `rig_base`, on top of one bar that tilts about y.
 
-    The tilt axis passes (tilt_axis_x_m, 0, tilt_axis_z_m).
+    The tilt axis passes (tilt_axis_x_m, 0, tilt_axis_z_m). `zero_sigma_rad` is the standard deviation of each pan's
+    zero and yaw together: distances by the joints are as uncertain, and commands may diverge by as much.
     """
 
     baseline_m: float = 0.065
@@ -165,9 +166,11 @@ class Rig:
     right_mount: EyeMount = field(default_factory=EyeMount)
     tilt_axis_x_m: float = 0.0
     tilt_axis_z_m: float = 0.0
+    zero_sigma_rad: float = 0.0
 
     def __post_init__(self) -> None:
         _check_number("baseline_m", self.baseline_m, 1e-3, 10.0, "m")
+        _check_number("zero_sigma_rad", self.zero_sigma_rad, 0.0, 0.2, "rad")
         _check_number("tilt_axis_x_m", self.tilt_axis_x_m, -1.0, 1.0, "m")
         _check_number("tilt_axis_z_m", self.tilt_axis_z_m, -1.0, 1.0, "m")
         _check_number("minimum_vergence_rad", self.minimum_vergence_rad, 0.0, 0.5 * math.pi, "rad")
@@ -194,6 +197,16 @@ class Rig:
         return self.joints.tilt
 
     @property
+    def zero_error_rad(self) -> float:
+        """Largest error of the vergence that the pans' zeros leave [rad]."""
+        return 3.0 * math.sqrt(2.0) * self.zero_sigma_rad
+
+    @property
+    def least_vergence_rad(self) -> float:
+        """Smallest vergence that may be asked for [rad]: the minimum, as far as the zeros are known."""
+        return self.minimum_vergence_rad - self.zero_error_rad
+
+    @property
     def mean_pitch_rad(self) -> float:
         """Mean pitch of both cameras on their pan axes [rad]."""
         return 0.5 * (self.left_mount.pitch_rad + self.right_mount.pitch_rad)
@@ -211,12 +224,13 @@ class Rig:
 
         A pan is its axis's angle and the camera's yaw together. Without zeros, scales and yaws they are the joints'.
         """
-        left, right, tilt = joints_rad
-        return (
-            self.pan_left.axis_rad(left) + self.left_mount.yaw_rad,
-            self.pan_right.axis_rad(right) + self.right_mount.yaw_rad,
-            self.tilt.axis_rad(tilt),
-        )
+        left, right, tilt = (self.eye_angle(name, rad) for name, rad in zip(JOINT_NAMES, joints_rad, strict=True))
+        return left, right, tilt
+
+    def eye_angle(self, name: str, joint_rad: float) -> float:
+        """Return the angle of one joint's optical axis [rad], as `eye_angles`."""
+        yaws_rad = {"pan_left": self.left_mount.yaw_rad, "pan_right": self.right_mount.yaw_rad}
+        return self.joints[name].axis_rad(joint_rad) + yaws_rad.get(name, 0.0)
 
     def joint_angles(self, eyes_rad: Sequence[float]) -> tuple[float, float, float]:
         """Return the angles of the joints [rad] at angles of the optical axes; the inverse of `eye_angles`."""

@@ -25,8 +25,8 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from vergence_bringup.launching.arguments import ARGUMENTS, problems, unknown
 from vergence_bringup.launching.endings import ending
-from vergence_bringup.launching.head_urdf import head_urdf
 from vergence_bringup.node_table import HOSTS, NODES
+from vergence_rig.head_urdf import head_urdf
 from vergence_rig.rig_file import load_rig
 
 Build = Callable[[Mapping[str, str]], list[Any]]
@@ -90,8 +90,7 @@ def frames(values: Mapping[str, str], **parameters: Any) -> list[Node]:
     """Return robot_state_publisher with the head's URDF, where it is wanted: the argument `frames`."""
     if values["frames"] == "false" or (values["frames"] == "auto" and not _installed(_FRAMES)):
         return []
-    share = Path(get_package_share_directory("vergence_bringup"))
-    urdf = head_urdf((share / "urdf" / "vergence_head.urdf").read_text(encoding="utf-8"), load_rig(values["rig"]))
+    urdf = head_urdf(load_rig(values["rig"]))
     return [
         Node(
             package=_FRAMES,

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import yaml
@@ -63,9 +64,9 @@ def _camera(eye: str, spec: CameraSpec, found: Identification) -> CameraSpec:
     return spec.replaced(**changes)
 
 
-def rig_text(rig: Rig, found: Identification, when: str) -> str:
+def rig_text(rig: Rig, found: Mapping[str, Any], when: str) -> str:
     """Return rig.yaml for an identified rig, with the record of what was found. `when` is the time in words."""
-    document = rig_as_mapping(rig) | {"identified": {"at": when, **record(found)}}
+    document = rig_as_mapping(rig) | {"identified": {"at": when, **found}}
     assert rig_from_mapping(document) == rig  # the file reads back as the same rig
     return _HEAD + yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
 

@@ -13,7 +13,8 @@ from vergence_rig.camera import CameraModel
 
 Array = npt.NDArray[np.float64]
 
-_WIDTH_PX = 320
+WIDTH_PX = 320
+"""Width of the pictures that a recording of many stores."""
 _LEAST_USABLE = 0.7
 _LEAST_FRAMES = 8
 
@@ -32,12 +33,12 @@ class SeenMotion:
     agreement: Array
 
 
-def shrunk(picture: Image) -> Image:
-    """Return a grey picture (h, w) of 320 px width or less: small enough to store hundreds of them."""
+def shrunk(picture: Image, width_px: int = WIDTH_PX) -> Image:
+    """Return a grey picture (h, w) of this width or less."""
     grey = picture if picture.ndim == 2 else np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
-    if grey.shape[1] <= _WIDTH_PX:
+    if grey.shape[1] <= width_px:
         return np.ascontiguousarray(grey)
-    size = (_WIDTH_PX, round(grey.shape[0] * _WIDTH_PX / grey.shape[1]))
+    size = (width_px, round(grey.shape[0] * width_px / grey.shape[1]))
     return np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from sensor_msgs.msg import CompressedImage, JointState
 from sensor_msgs.msg import Image as RawImage
 
+from vergence_calibration.geometry.identify_geometry import Look
 from vergence_calibration.identification.axis_log import EYES, AxisLog, EyeCamera, Frames, IdentifyError, Move
 from vergence_calibration.identification.node_parameters import Owner, Owners
 from vergence_calibration.identification.pose import pose_with_room
-from vergence_calibration.identification.seen_motion import shrunk
+from vergence_calibration.identification.seen_motion import WIDTH_PX, shrunk
 from vergence_calibration.ros.controllers import Controllers, number_of
 from vergence_calibration.ros.running_head import REPEAT_S, RunningHead
 from vergence_common.images import ImageError, compressed_to_array, image_to_array
@@ -32,6 +33,8 @@ _AHEAD_S, _OLD_S = 0.2, 5.0
 _RETURN_S = 3.0
 _RETURNED_RAD = 0.02
 _WHOLE_TURN_RAD = math.tau
+_LOOK_WIDTH_PX = 640
+_LOOK_REST_S = 0.4
 
 
 class IdentifiedHead(RunningHead):
@@ -50,6 +53,8 @@ class IdentifiedHead(RunningHead):
         self._before: dict[str, float] = {}
         self._reports: list[tuple[float, dict[str, float]]] | None = None
         self._frames: dict[str, Frames] | None = None
+        self._width_px = WIDTH_PX
+        self._sizes_px: dict[str, tuple[int, int]] = {}
         self._newest: dict[str, list[float]] = {eye: [] for eye in EYES}
         self._problem = ""
         self._topics: dict[str, str] = {}
@@ -116,6 +121,21 @@ class IdentifiedHead(RunningHead):
         rows = [(stamp_s, positions[joint]) for stamp_s, positions in reports if joint in positions]
         return AxisLog(joint, np.array(commands), np.array(rows, float).reshape(-1, 2), frames)
 
+    def look(self, joints_rad: Mapping[str, float]) -> Look:
+        """See LookingHead; the joints' angles are those reported while both pictures were taken."""
+        self._rest(self.command(joints_rad), _LOOK_REST_S)
+        self._check_alone()
+        with self.arrival:
+            self._frames, self._width_px = {eye: Frames() for eye in EYES}, _LOOK_WIDTH_PX
+        try:
+            self._wait(lambda: all(f.stamps_s for f in (self._frames or {}).values()), self._no_images)
+            with self.arrival:
+                pictures = {eye: frames.pictures[0] for eye, frames in (self._frames or {}).items()}
+                return Look([self._present[name] for name in JOINT_NAMES], pictures, dict(self._sizes_px))
+        finally:
+            with self.arrival:
+                self._frames, self._width_px = None, WIDTH_PX
+
     def owners(self) -> Owners:
         """Return the nodes that have latencies as parameters, and their values."""
         cameras = {}
@@ -159,7 +179,8 @@ class IdentifiedHead(RunningHead):
                 whole = (
                     compressed_to_array(message) if isinstance(message, CompressedImage) else image_to_array(message)
                 )
-                picture = shrunk(whole)
+                self._sizes_px[eye] = (whole.shape[1], whole.shape[0])
+                picture = shrunk(whole, self._width_px)
             except ImageError as error:
                 self._problem = f"{self._topics[eye]}: {error}"
         with self.arrival:

@@ -1,4 +1,4 @@
-"""`vergence identify`: measures latencies, pixels per radian and signs of a running head, and writes its YAML."""
+"""`vergence identify`: measures timing and geometry of a running head, and writes its YAML."""
 
 import argparse
 import signal
@@ -6,11 +6,17 @@ import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from vergence_calibration import backed_up_file
+from vergence_calibration.geometry.bundle import Constraint
+from vergence_calibration.geometry.geometry_report import geometry_lines, geometry_record
+from vergence_calibration.geometry.identify_geometry import FoundGeometry, identify_geometry
+from vergence_calibration.geometry.poses import PoseParameters
+from vergence_calibration.geometry.stereo_file import mount_constraint, read_stereo
 from vergence_calibration.identification.axis_log import IdentifyError, IdentifyParameters
 from vergence_calibration.identification.identification import Identification, identify
-from vergence_calibration.identification.identified_rig import identified_rig, nodes_text, rig_text
+from vergence_calibration.identification.identified_rig import identified_rig, nodes_text, record, rig_text
 from vergence_calibration.identification.latencies import ASSUMPTIONS, Estimate
 from vergence_calibration.identification.node_parameters import node_parameters
 from vergence_calibration.ros.identified_head import TRANSPORTS, IdentifiedHead
@@ -20,6 +26,7 @@ from vergence_rig.rig import JOINT_NAMES
 from vergence_rig.rig_file import load_rig
 
 _REFUSED, _BAD_INPUT = 1, 2
+_TIMING, _GEOMETRY = "timing", "geometry"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,11 +36,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", type=expanded, help="rig.yaml to write (default: that of --rig, else rig_identified.yaml)"
     )
     parser.add_argument(
-        "--axes", nargs="+", choices=JOINT_NAMES, default=list(JOINT_NAMES), help="axes to identify (default: all)"
+        "--only",
+        choices=(_TIMING, _GEOMETRY),
+        help="half of the identification: latencies, signs and lost motion, or mounts, zeros, scales and cameras "
+        "(default: both)",
     )
-    parser.add_argument("--amplitude-deg", type=float, default=3.0, help="amplitude of the moves (default %(default)s)")
-    parser.add_argument("--steps", type=int, default=14, help="number of steps of each axis (default %(default)s)")
-    parser.add_argument("--rest-s", type=float, default=0.45, help="rest after each move (default %(default)s)")
+    parser.add_argument(
+        "--axes", nargs="+", choices=JOINT_NAMES, default=list(JOINT_NAMES), help="axes of the timing (default: all)"
+    )
+    parser.add_argument(
+        "--amplitude-deg", type=float, default=3.0, help="amplitude of the timing's moves (default %(default)s)"
+    )
+    parser.add_argument(
+        "--steps", type=int, default=14, help="number of steps of each axis of the timing (default %(default)s)"
+    )
+    parser.add_argument(
+        "--rest-s", type=float, default=0.45, help="rest after each move of the timing (default %(default)s)"
+    )
+    parser.add_argument(
+        "--poses",
+        type=int,
+        default=PoseParameters().poses,
+        help="number of poses of the geometry (default %(default)s)",
+    )
+    parser.add_argument(
+        "--stereo",
+        type=Path,
+        help="stereo.yaml of `vergence calibrate cameras`, for the geometry (default: the one beside --rig, if any)",
+    )
     parser.add_argument(
         "--assume",
         choices=ASSUMPTIONS,
@@ -65,23 +95,51 @@ def run(options: argparse.Namespace) -> int:
 
 def _identify(options: argparse.Namespace) -> int:
     rig = load_rig(options.rig)
-    parameters = IdentifyParameters(amplitude_deg=options.amplitude_deg, steps=options.steps, rest_s=options.rest_s)
+    timing = IdentifyParameters(amplitude_deg=options.amplitude_deg, steps=options.steps, rest_s=options.rest_s)
+    poses = PoseParameters(poses=options.poses)
+    constraints = _stereo(options)
     out: Path = options.out or Path(options.rig or "rig_identified.yaml")
+    found: Identification | None = None
+    geometry: FoundGeometry | None = None
     with IdentifiedHead(rig, options.namespace, options.transport, options.timeout_s) as head:
         try:
             for name in head.begin():
                 _print(f"{name} is disabled during the identification")
-            found = identify(head, options.axes, parameters, options.assume, _print)
-            owners = head.owners()
+            if options.only != _GEOMETRY:
+                found = identify(head, options.axes, timing, options.assume, _print)
+                rig = identified_rig(rig, found)
+                owners = head.owners()
+            if options.only != _TIMING:
+                geometry = identify_geometry(head, rig, poses, constraints, _print)
+                rig = geometry.rig
         finally:
             _ignore_signals()
     _raise_on_signals()
-    _print_latencies(found)
-    texts = {out: rig_text(identified_rig(rig, found), found, time.strftime("%Y-%m-%d %H:%M:%S"))}
-    changes = node_parameters(found.latencies, owners)
+    records: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
+    if found is not None:
+        _print_latencies(found)
+        records |= record(found)
+        changes = node_parameters(found.latencies, owners)
+    if geometry is not None:
+        _print("\n" + "\n".join(geometry_lines(geometry)))
+        records |= geometry_record(geometry)
+    texts = {out: rig_text(rig, records, time.strftime("%Y-%m-%d %H:%M:%S"))}
     if changes:
         texts[out.with_name(f"{out.stem}.nodes.yaml")] = nodes_text(changes)
     return _write(texts, options.yes)
+
+
+def _stereo(options: argparse.Namespace) -> tuple[Constraint, ...]:
+    """Return the constraint of stereo.yaml: the named one, or the one beside --rig. Raises IdentifyError."""
+    path: Path | None = options.stereo
+    beside = Path(options.rig).with_name("stereo.yaml")
+    if path is None and options.rig and beside.exists():
+        path = beside
+    if path is None or options.only == _TIMING:
+        return ()
+    _print(f"the rotation between the cameras of {path} is used for the mounts")
+    return (mount_constraint(read_stereo(path)),)
 
 
 def _raise_on_signals() -> None:

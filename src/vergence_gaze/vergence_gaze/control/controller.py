@@ -11,13 +11,14 @@ from vergence_gaze.control.perception import LATEST_FUTURE_S, Perception
 from vergence_gaze.control.report import Command, GazeReport, make_report
 from vergence_gaze.control.search_pattern import Searcher
 from vergence_gaze.control.track_requests import TrackRequests
-from vergence_gaze.estimation.observations import JointResolution, Observation, PointSighting
+from vergence_gaze.estimation.observations import JointReport, JointResolution, Observation, PointSighting
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
 from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, resolve_goal
 from vergence_gaze.joints.feedback import FeedbackMonitor
 from vergence_gaze.joints.frames import point_in_rig
+from vergence_gaze.joints.joint_reports import in_eye_angles
 from vergence_gaze.joints.limits import CommandLimits
 from vergence_gaze.joints.resolution import pulse_steps_rad, rig_with_steps
 from vergence_gaze.laws import make_law
@@ -37,11 +38,13 @@ _UNKNOWN = np.full(3, np.nan)
 class GazeController:
     """Steers both eyes and the tilt onto a target and holds them there.
 
-    Time is the caller's, in seconds; the stamps of observations are of the same clock.
+    Time is the caller's, in seconds; the stamps of observations are of the same clock. Joint reports and commands are
+    of the joints; everything inside, and every goal and report, is in eye angles (see `vergence_rig.kinematics`).
     """
 
     def __init__(self, rig: Rig, parameters: GazeParameters, period_s: float = 0.01) -> None:
-        self._rig, self._period_s = rig, period_s
+        self._described, self._period_s = rig, period_s
+        self._rig = rig = rig.in_eye_angles()
         self._limits = CommandLimits(rig)
         self._goals = GoalMonitor()
         self._enabled = True
@@ -76,7 +79,7 @@ class GazeController:
     @property
     def resolution_rad(self) -> Array:
         """The smallest step of each joint (3,) [rad]: its driver's, or else the one that the rig describes."""
-        return pulse_steps_rad(self._rig)
+        return pulse_steps_rad(self._described)
 
     @property
     def goal_id(self) -> int | None:
@@ -92,7 +95,7 @@ class GazeController:
 
         Raises FrameError for an unknown frame, or before any joint is known.
         """
-        return point_in_rig(point_m, frame, stamp_s, self._perception.history, self._rig.baseline_m)
+        return point_in_rig(point_m, frame, stamp_s, self._perception.history, self._perception.kinematics)
 
     def look_at(self, goal: Goal, now_s: float) -> int:
         """Start a goal and return its id; the active one ends as PREEMPTED.
@@ -103,7 +106,8 @@ class GazeController:
         try:
             if not self._enabled:
                 raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
-            request = resolve_goal(goal, self._rig, self._p, self._perception.history, now_s, self._feedback.fault)
+            kinematics, history = self._perception.kinematics, self._perception.history
+            request = resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
         except GoalError as error:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
@@ -191,13 +195,15 @@ class GazeController:
             self._perception.history.on_command(now_s)
         if not fault:
             self._update_goal(now_s)
-        joints_rad = sent if sending else None
+        joints_rad = np.array(self._described.joint_angles(sent.tolist())) if sending else None
         return Command(joints_rad, self._report(now_s), self._goals.pop_outcomes(), self._requests.pop())
 
     def _observe(self, observation: Observation, now_s: float) -> None:
         if isinstance(observation, JointResolution):
             self._set_steps(observation)
             return
+        if isinstance(observation, JointReport):
+            observation = in_eye_angles(observation, self._described)
         known = self._perception.history.known and observation.stamp_s <= now_s + LATEST_FUTURE_S
         if isinstance(observation, PointSighting) and known and self._goals.goal_id is None and self._enabled:
             self._follow_stream(now_s)
@@ -205,9 +211,10 @@ class GazeController:
         self._perception.update(observation, now_s, self._law, verging)
 
     def _set_steps(self, resolution: JointResolution) -> None:
-        rig = rig_with_steps(self._rig, resolution.steps_rad)
-        if rig != self._rig:
-            self._rig = rig
+        described = rig_with_steps(self._described, resolution.steps_rad)
+        if described != self._described:
+            self._described = described
+            self._rig = rig = described.in_eye_angles()
             self._perception.set_rig(rig)
             self._law = make_law(rig, self._p)
 

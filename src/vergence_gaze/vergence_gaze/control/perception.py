@@ -26,6 +26,7 @@ from vergence_gaze.joints.resolution import pulse_steps_rad
 from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_gaze.laws.protocol import Law
 from vergence_gaze.parameters import GazeParameters
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
@@ -43,6 +44,7 @@ class Perception:
 
     def __init__(self, rig: Rig, parameters: GazeParameters, driven: Driven) -> None:
         self._rig, self._described_steps_rad = rig, pulse_steps_rad(rig)
+        self.kinematics = Kinematics(rig)
         self.history = ShaftHistory(rig)
         self.image_s = -math.inf
         self._images_fault, self._images_fault_s = "", -math.inf
@@ -57,7 +59,7 @@ class Perception:
         self._p, self._driven = parameters, driven
         self.history.play.learning_share = parameters.servo.play_learning
         self._moves = JointMoves(self._rig, self.history)
-        self.tracking = TargetTracking(self._rig, parameters, self.history, self._moves)
+        self.tracking = TargetTracking(self.kinematics, parameters, self.history, self._moves)
         self.judge = VergenceJudge(parameters.verged)
         self.judge.unresolved_rad, self.judge.dead_band_rad = self._unresolved_rad, self._dead_band_rad
 
@@ -121,7 +123,7 @@ class Perception:
         """Return where the target is, with its uncertainty."""
         if estimate is None:
             return UNKNOWN
-        return target_position(estimate, self._rig, self._shaft_variances, self.vergence_offset)
+        return target_position(estimate, self.kinematics, self._shaft_variances, self.vergence_offset)
 
     def unseen_s(self, now_s: float) -> float:
         """Return for how long images arrived that did not show the target; inf before the first that did.

@@ -11,7 +11,8 @@ from vergence_gaze.estimation.distance import TargetPosition
 from vergence_gaze.estimation.target_filter import TargetEstimate
 from vergence_gaze.goals.goal import Outcome, TrackRequest
 from vergence_gaze.phases import Phase, PhaseMachine
-from vergence_rig.geometry import GeometryError, eye_direction, eye_position, fixation_of_rays
+from vergence_rig.geometry import EyeAngles, GeometryError
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
@@ -74,7 +75,7 @@ def make_report(
     joints = perception.history.shaft_rad if known else np.full(3, math.nan)
     estimate = perception.tracking.estimate(now_s) if known else None
     residual = residual_of(estimate, joints)
-    fixation, miss = fixation_of_joints(joints, rig.baseline_m)
+    fixation, miss = fixation_of(joints, perception.kinematics)
     images_missing = perception.images_missing(now_s)
     reason = phases.reason if known else f"waiting: {fault}"
     if fault not in reason:
@@ -120,17 +121,13 @@ def disparity_px(vergence_residual_rad: float, focal_px: float) -> float:
     return focal_px * math.tan(vergence_residual_rad)
 
 
-def fixation_of_joints(joints_rad: Array, baseline_m: float) -> tuple[Array, float]:
-    """Return where the axes at these joint angles (3,) meet, (3,) [m], and their miss distance; NaN if nowhere."""
-    if not np.isfinite(joints_rad).all():
+def fixation_of(angles_rad: Array, kinematics: Kinematics) -> tuple[Array, float]:
+    """Return where the axes at these eye angles (3,) meet, (3,) [m], and their miss distance; NaN if nowhere."""
+    if not np.isfinite(angles_rad).all():
         return np.full(3, math.nan), math.nan
+    left, right, tilt = (float(angle) for angle in angles_rad)
     try:
-        fixation = fixation_of_rays(
-            eye_position(True, baseline_m),
-            eye_direction(joints_rad[0], joints_rad[2]),
-            eye_position(False, baseline_m),
-            eye_direction(joints_rad[1], joints_rad[2]),
-        )
+        fixation = kinematics.fixation(EyeAngles(left, right, tilt))
     except GeometryError:
         return np.full(3, math.nan), math.nan
     return fixation.point_m, fixation.miss_distance_m

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from vergence_gaze.estimation.target_filter import TargetEstimate
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
-from vergence_rig.geometry import GeometryError, point_at
+from vergence_rig.geometry import GeometryError, from_version_vergence
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
@@ -40,8 +41,9 @@ UNKNOWN = TargetPosition(np.full(3, math.nan), np.full((3, 3), math.nan), math.n
 
 
 def joint_variances(rig: Rig) -> Array:
-    """Return the variance of each shaft at rest (3,) [rad^2] that is left although its play is modelled."""
-    return np.array(
+    """Return the variance of each axis at rest (3,) [rad^2] that is left although its play is modelled."""
+    zeros = np.array([rig.zero_sigma_rad, rig.zero_sigma_rad, 0.0]) ** 2
+    return zeros + np.array(
         [
             (_PLAY_SIGMA_SHARE * 0.5 * math.hypot(servo.dead_band_rad, servo.backlash_rad)) ** 2
             + servo.pulse_step_rad**2 / 12.0
@@ -51,7 +53,7 @@ def joint_variances(rig: Rig) -> Array:
 
 
 def target_position(
-    estimate: TargetEstimate, rig: Rig, shaft_variances: Array, offset: VergenceOffset | None = None
+    estimate: TargetEstimate, kinematics: Kinematics, shaft_variances: Array, offset: VergenceOffset | None = None
 ) -> TargetPosition:
     """Return the target's position from the filter's estimate and the shafts' variances (3,) [rad^2].
 
@@ -72,29 +74,18 @@ def target_position(
     sigma = math.sqrt(covariance[1, 1])
     near = estimate.vergence_rad + _TO_95_PERCENT * sigma
     far = estimate.vergence_rad - _TO_95_PERCENT * sigma
-    low = _distance(estimate, near, rig.baseline_m)
-    high = _distance(estimate, far, rig.baseline_m)
+    low, high = (_distance(estimate, vergence_rad, kinematics) for vergence_rad in (near, far))
+    version, vergence, tilt = (float(angle) for angle in estimate.angles_rad)
     try:
-        point = point_at(estimate.version_rad, estimate.vergence_rad, estimate.tilt_rad, rig.baseline_m)
-        jacobian = _jacobian(estimate, rig.baseline_m)
+        point = kinematics.point_at(version, vergence, tilt)
+        jacobian = kinematics.point_jacobian(from_version_vergence(version, vergence, tilt))
     except GeometryError:
         return TargetPosition(UNKNOWN.point_m, UNKNOWN.covariance_m2, math.inf, low, high)
     return TargetPosition(point, jacobian @ covariance @ jacobian.T, float(np.linalg.norm(point)), low, high)
 
 
-def _distance(estimate: TargetEstimate, vergence_rad: float, baseline_m: float) -> float:
+def _distance(estimate: TargetEstimate, vergence_rad: float, kinematics: Kinematics) -> float:
     try:
-        return float(np.linalg.norm(point_at(estimate.version_rad, vergence_rad, estimate.tilt_rad, baseline_m)))
+        return float(np.linalg.norm(kinematics.point_at(estimate.version_rad, vergence_rad, estimate.tilt_rad)))
     except GeometryError:
         return math.inf
-
-
-def _jacobian(estimate: TargetEstimate, baseline_m: float) -> Array:
-    """Return d point / d (version, vergence, tilt), (3, 3) [m/rad]."""
-    step = min(1e-5, 0.1 * abs(estimate.vergence_rad))
-
-    def displaced(offset: Array) -> Array:
-        version, vergence, tilt = (float(angle) for angle in estimate.angles_rad + offset)
-        return point_at(version, vergence, tilt, baseline_m)
-
-    return np.column_stack([(displaced(row) - displaced(-row)) / (2.0 * step) for row in step * np.eye(3)])

@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from vergence_gaze.estimation import directions
-from vergence_gaze.estimation.directions import SightingError
+from vergence_gaze.estimation.directions import Directions, SightingError, shifted, without_depth
 from vergence_gaze.estimation.exposures import Exposures, positive_sigma
 from vergence_gaze.estimation.gates import (
     ClassGate,
@@ -35,22 +34,24 @@ from vergence_gaze.goals.requested_point import RequestedPoint
 from vergence_gaze.joints.joint_moves import JointMoves
 from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_gaze.parameters import GazeParameters
-from vergence_rig.geometry import point_at
-from vergence_rig.rig import Rig
+from vergence_rig.geometry import GeometryError
+from vergence_rig.kinematics import Kinematics
 
 Array = npt.NDArray[np.float64]
 
 _NAMED_DISTANCES = 4
-_FARTHEST_RAD = 0.0065  # vergence of 10 m with a baseline of 65 mm
+_FARTHEST_M = 10.0
 _RESTED_S = 0.05  # an image shows where a move ended once the joints have rested this long
 
 
 class TargetTracking(TargetEstimator):
     """Keeps the request, and updates the target's estimate by the observations that pass its gates."""
 
-    def __init__(self, rig: Rig, parameters: GazeParameters, history: ShaftHistory, moves: JointMoves) -> None:
+    def __init__(
+        self, kinematics: Kinematics, parameters: GazeParameters, history: ShaftHistory, moves: JointMoves
+    ) -> None:
         super().__init__(parameters, history, moves)
-        self._baseline_m = rig.baseline_m
+        self._kinematics, self._directions = kinematics, Directions(kinematics, history)
         self._exposures = Exposures(parameters, history)
         self.clear()
 
@@ -100,7 +101,7 @@ class TargetTracking(TargetEstimator):
     def request_point(self, now_s: float, stamp_s: float, angles_rad: Array, covariance: Array, goal_id: int) -> None:
         """Start with a point in space, as `request_target`: only what the tracker sees there updates it."""
         answer_within_s = self._p.control.no_images_s
-        point = RequestedPoint(goal_id, joints_of(angles_rad), self._p.target, answer_within_s)
+        point = RequestedPoint(goal_id, joints_of(angles_rad), self._kinematics, self._p.target, answer_within_s)
         self._start(RequestGate(goal_id), point=point)
         self._expect(now_s, stamp_s, angles_rad, covariance)
 
@@ -132,7 +133,7 @@ class TargetTracking(TargetEstimator):
             # Boxes of a class tell the distance that the tracker alone is not sure of.
             unsure = track.ambiguous and self._class is not None
             shown = replace(track, disparity_rad=math.nan) if unsure else track
-            return directions.track(self._history, shown, sigma, disparity_sigma)
+            return self._directions.track(shown, sigma, disparity_sigma, self._assumed_vergence_rad(track.stamp_s))
 
         sighting = Sighting("track", track, locate, track.skew_s, track.extent_rad)
         accepted = self._consider(sighting, now_s)
@@ -145,7 +146,8 @@ class TargetTracking(TargetEstimator):
 
         def locate() -> tuple[Measurement, Array]:
             sigma = self._exposures.sigma(box.stamp_s, box.skew_s, box.sigma_rad)
-            return directions.box(self._history, box, sigma, float(self.joint_rates_rad_s(box.stamp_s)[1]))
+            rate_rad_s = float(self.joint_rates_rad_s(box.stamp_s)[1])
+            return self._directions.box(box, sigma, rate_rad_s, self._assumed_vergence_rad(box.stamp_s))
 
         accepted = self._consider(Sighting("box", box, locate, box.skew_s, box.extent_rad), now_s)
         if accepted and self._class is not None:
@@ -160,7 +162,7 @@ class TargetTracking(TargetEstimator):
 
         def locate() -> tuple[Measurement, Array]:
             sigma = positive_sigma(point.sigma_rad, self._p.target.point_sigma_rad)
-            measurement = directions.point(self._history, point.stamp_s, point.point_m, self._baseline_m, sigma)
+            measurement = self._directions.point(point.stamp_s, point.point_m, sigma)
             return measurement, joints_of(measurement.values)
 
         return self._consider(Sighting("point", point, locate), now_s)
@@ -182,9 +184,9 @@ class TargetTracking(TargetEstimator):
             direction_only |= verdict.direction_only
         measurement, seen_rad = sighting.located
         if self._class is not None and sighting.source == "track":
-            measurement, seen_rad = directions.shifted(measurement, seen_rad, self._class_gate.beside_rad)
+            measurement, seen_rad = shifted(measurement, seen_rad, self._class_gate.beside_rad)
         if direction_only:
-            measurement, seen_rad = directions.without_depth(measurement, seen_rad)
+            measurement, seen_rad = without_depth(measurement, seen_rad)
         if sighting.source == "track" and self._class is None:
             self._observe_play(sighting.stamp_s, sighting.skew_s, seen_rad)
         if not self.filter.initialised:
@@ -194,17 +196,23 @@ class TargetTracking(TargetEstimator):
             self._newer.tracked_s = max(self._newer.tracked_s, sighting.stamp_s)
         return accepted
 
+    def _assumed_vergence_rad(self, stamp_s: float) -> float:
+        """Return the vergence that a target seen by one eye is taken to have."""
+        estimate = self.estimate(stamp_s) if math.isfinite(stamp_s) else None
+        return self._p.target.prior_vergence_rad if estimate is None else estimate.vergence_rad
+
     def _ambiguity_of(self, track: TrackSighting) -> str:
         """Return the distances that fit, in words, the likeliest first."""
         distances_m = []
         for disparity_rad, _ in track.candidates[:_NAMED_DISTANCES]:
             there = replace(track, disparity_rad=disparity_rad)
-            _, (left_pan, right_pan, tilt) = directions.track(self._history, there, 0.0, 0.0)
-            if right_pan - left_pan > _FARTHEST_RAD:
-                point_m = point_at(0.5 * (left_pan + right_pan), right_pan - left_pan, tilt, self._baseline_m)
-                distances_m.append(f"{np.linalg.norm(point_m):.2f} m")
-            else:
-                distances_m.append("far away")
+            _, (left_pan, right_pan, tilt) = self._directions.track(there, 0.0, 0.0, math.nan)
+            try:
+                place = self._kinematics.point_at(0.5 * (left_pan + right_pan), right_pan - left_pan, tilt)
+                distance_m = float(np.linalg.norm(place))
+            except GeometryError:
+                distance_m = math.inf
+            distances_m.append(f"{distance_m:.2f} m" if distance_m < _FARTHEST_M else "far away")
         return f"{track.reason}: {', '.join(distances_m)}" if len(distances_m) > 1 else track.reason
 
     def _observe_play(self, stamp_s: float, skew_s: float, seen_rad: Array) -> None:

@@ -6,17 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vergence_gaze.estimation.directions import SightingError, direction_angles, spread_of_eye
+from vergence_gaze.estimation.directions import LARGEST_TANGENT, spread_of_eye
+from vergence_gaze.estimation.rays import gaze_of_ray, gaze_of_rays
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result
 from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_gaze.parameters import LONGEST_GOAL_S, GazeParameters
-from vergence_rig.geometry import (
-    GeometryError,
-    eye_position,
-    from_version_vergence,
-    gaze_for_point,
-    rotation_rig_from_eye,
-)
+from vergence_rig.geometry import EyeAngles, GeometryError, from_version_vergence
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
@@ -51,7 +47,13 @@ class ClassRequest:
 
 
 def resolve_goal(
-    goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, now_s: float, fault: str = ""
+    goal: Goal,
+    rig: Rig,
+    kinematics: Kinematics,
+    parameters: GazeParameters,
+    history: ShaftHistory,
+    now_s: float,
+    fault: str = "",
 ) -> RequestedTarget | RequestedPose | ClassRequest:
     """Return what a goal requests; raises GoalError (INVALID or UNREACHABLE).
 
@@ -70,13 +72,12 @@ def resolve_goal(
         return _pose(goal, rig, parameters, history)
     stamp_s = goal.stamp_s if math.isfinite(goal.stamp_s) and history.covers(goal.stamp_s) else now_s
     try:
-        target = {
-            GoalKind.POINT: _point,
-            GoalKind.PIXEL: _pixel,
-            GoalKind.STEREO_PIXEL: _stereo_pixel,
-        }[goal.kind](goal, rig, parameters, history, stamp_s)
-    except SightingError as error:
-        raise GoalError(Result.INVALID, str(error)) from error
+        if goal.kind is GoalKind.POINT:
+            target = _point(goal, kinematics, stamp_s)
+        elif goal.kind is GoalKind.PIXEL:
+            target = _pixel(goal, kinematics, parameters, history.shaft_at(stamp_s), stamp_s)
+        else:
+            target = _stereo_pixel(goal, rig, kinematics, history.shaft_at(stamp_s), stamp_s)
     except GeometryError as error:
         raise GoalError(Result.UNREACHABLE, str(error)) from error
     _check_reach(from_version_vergence(*(float(angle) for angle in target.angles_rad)).as_dict(), rig, parameters)
@@ -92,57 +93,67 @@ def _pose(goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistor
     joints = np.array([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad])
     if goal.kind is GoalKind.RELATIVE_ANGLES:
         joints = joints + present
-    if joints[1] - joints[0] < rig.minimum_vergence_rad - 1e-6:
+    if joints[1] - joints[0] < rig.least_vergence_rad - 1e-6:
         raise GoalError(
             Result.UNREACHABLE,
-            f"the vergence must be at least {rig.minimum_vergence_rad:g} rad: got {joints[1] - joints[0]:.4f}",
+            f"the vergence must be at least {rig.least_vergence_rad:g} rad: got {joints[1] - joints[0]:.4f}",
         )
     _check_reach(dict(zip(("pan_left", "pan_right", "tilt"), joints.tolist(), strict=True)), rig, parameters)
     return RequestedPose(joints)
 
 
-def _point(goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, stamp_s: float) -> RequestedTarget:
-    eyes = gaze_for_point(goal.point_m, rig.baseline_m)
-    angles = np.array([eyes.version_rad, eyes.vergence_rad, eyes.tilt_rad])
-    return RequestedTarget(stamp_s, angles, np.eye(3) * _POINT_SIGMA_RAD**2)
+def _point(goal: Goal, kinematics: Kinematics, stamp_s: float) -> RequestedTarget:
+    eyes = kinematics.gaze_for_point(goal.point_m)
+    return RequestedTarget(stamp_s, _angles(eyes), np.eye(3) * _POINT_SIGMA_RAD**2)
 
 
-def _pixel(goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, stamp_s: float) -> RequestedTarget:
-    joints = history.shaft_at(stamp_s)
-    x, y = goal.left_xy if goal.left_eye else goal.right_xy
-    eye_pan = joints[0] if goal.left_eye else joints[1]
-    pan, tilt = direction_angles(eye_pan, joints[2], x, y)
+def _pixel(
+    goal: Goal, kinematics: Kinematics, parameters: GazeParameters, joints: Array, stamp_s: float
+) -> RequestedTarget:
+    left, xy = goal.left_eye, (goal.left_xy if goal.left_eye else goal.right_xy)
+    _check_seen("the pixel", xy)
+    own_pan = joints[0] if left else joints[1]
     if math.isfinite(goal.depth_m) and goal.depth_m > 0:
-        ray = rotation_rig_from_eye(eye_pan, joints[2]) @ (1.0, -x, -y)
-        place = eye_position(goal.left_eye, rig.baseline_m) + goal.depth_m * ray / np.linalg.norm(ray)
-        eyes = gaze_for_point(place, rig.baseline_m)
-        angles = np.array([eyes.version_rad, eyes.vergence_rad, eyes.tilt_rad])
+        ray = kinematics.rotation_rig_from_optical(own_pan, joints[2]) @ (*xy, 1.0)
+        place = kinematics.lens(left, own_pan, joints[2]) + goal.depth_m * ray / np.linalg.norm(ray)
+        eyes = kinematics.gaze_for_point(place)
         # A stated depth is good to a tenth or so.
         sigma = 0.1 * max(abs(eyes.vergence_rad), 0.04)
-        return RequestedTarget(stamp_s, angles, spread_of_eye(goal.left_eye, _CLICK_SIGMA_RAD, sigma))
+        return RequestedTarget(stamp_s, _angles(eyes), spread_of_eye(left, _CLICK_SIGMA_RAD, sigma))
     # Without depth the eyes keep their present vergence: all of it where they already look, elsewhere as far as it
     # leaves both directions open.
-    at_fovea = math.hypot(pan - eye_pan, tilt - joints[2]) <= parameters.saccade.threshold_rad
+    at_fovea = math.atan(math.hypot(*xy)) <= parameters.saccade.threshold_rad
     lowest, highest = _PRESENT_VERGENCE_BOUNDS_RAD
     vergence = float(np.clip(joints[1] - joints[0], lowest, math.inf if at_fovea else highest))
-    version = pan + 0.5 * vergence if goal.left_eye else pan - 0.5 * vergence
-    spread = spread_of_eye(goal.left_eye, _CLICK_SIGMA_RAD, parameters.target.prior_vergence_sigma_rad)
-    return RequestedTarget(stamp_s, np.array([version, vergence, tilt]), spread)
+    eyes, slopes = gaze_of_ray(kinematics, left, joints, xy, vergence)
+    spread = spread_of_eye(left, _CLICK_SIGMA_RAD, parameters.target.prior_vergence_sigma_rad, slopes)
+    return RequestedTarget(stamp_s, _angles(eyes), spread)
 
 
-def _stereo_pixel(
-    goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistory, stamp_s: float
-) -> RequestedTarget:
-    joints = history.shaft_at(stamp_s)
-    left_pan, tilt = direction_angles(joints[0], joints[2], *goal.left_xy)
-    right_pan, _ = direction_angles(joints[1], joints[2], goal.right_xy[0], goal.left_xy[1])
-    angles = np.array([0.5 * (left_pan + right_pan), right_pan - left_pan, tilt])
-    if angles[1] < rig.minimum_vergence_rad - _REACH_TOLERANCE_RAD:
+def _stereo_pixel(goal: Goal, rig: Rig, kinematics: Kinematics, joints: Array, stamp_s: float) -> RequestedTarget:
+    _check_seen("the pixels", (*goal.left_xy, goal.right_xy[0]))
+    angles = _angles(gaze_of_rays(kinematics, joints, joints, goal.left_xy, goal.right_xy[0]))
+    if angles[1] < rig.least_vergence_rad - _REACH_TOLERANCE_RAD:
         raise GoalError(
             Result.UNREACHABLE,
             f"the rays of the two pixels must meet: they diverge by {-math.degrees(angles[1]):.1f} deg",
         )
     return RequestedTarget(stamp_s, angles, np.eye(3) * (2.0 * _CLICK_SIGMA_RAD) ** 2)
+
+
+def _angles(eyes: EyeAngles) -> Array:
+    """Return version, vergence, tilt (3,)."""
+    return np.array([eyes.version_rad, eyes.vergence_rad, eyes.tilt_rad])
+
+
+def _check_seen(what: str, normalised: tuple[float, ...]) -> None:
+    if not all(abs(value) <= LARGEST_TANGENT for value in normalised):
+        shown = ", ".join(f"{value:g}" for value in normalised)
+        raise GoalError(
+            Result.INVALID,
+            f"{what} must be one that the lens can see: normalised coordinates must be within +-{LARGEST_TANGENT:g}, "
+            f"got ({shown})",
+        )
 
 
 def _check_reach(joints_rad: dict[str, float], rig: Rig, parameters: GazeParameters) -> None:

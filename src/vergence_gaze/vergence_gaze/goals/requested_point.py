@@ -7,7 +7,8 @@ import numpy.typing as npt
 
 from vergence_gaze.goals.goal import TrackRequest
 from vergence_gaze.target_parameters import TargetParameters
-from vergence_rig.geometry import eye_direction, rotation_rig_from_optical
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.kinematics import Kinematics
 
 Array = npt.NDArray[np.float64]
 
@@ -18,12 +19,21 @@ class RequestedPoint:
     Args:
         goal_id: of the goal.
         joints_rad: pan_left, pan_right, tilt (3,) that fixate the point.
+        kinematics: of the head.
         parameters: tolerances and times.
         answer_within_s: time in which an answer of the tracker is waited for.
     """
 
-    def __init__(self, goal_id: int, joints_rad: Array, parameters: TargetParameters, answer_within_s: float) -> None:
+    def __init__(
+        self,
+        goal_id: int,
+        joints_rad: Array,
+        kinematics: Kinematics,
+        parameters: TargetParameters,
+        answer_within_s: float,
+    ) -> None:
         self.goal_id, self._joints_rad, self._p = goal_id, joints_rad, parameters
+        self._kinematics = kinematics
         self._answer_within_s = answer_within_s
         self._rested_since_s = math.nan
         self._asked = self._answered = self._confirmed = False
@@ -46,7 +56,9 @@ class RequestedPoint:
         if self._asked or not stamp_s >= self._rested_since_s:
             return None
         pan, _, tilt = joints_rad
-        x, y, z = rotation_rig_from_optical(pan, tilt).T @ eye_direction(self._joints_rad[0], self._joints_rad[2])
+        point = self._kinematics.far_point(EyeAngles(*(float(angle) for angle in self._joints_rad)))
+        ray = np.array([point.x, point.y, point.z]) - point.w * self._kinematics.lens(True, pan, tilt)
+        x, y, z = ray @ self._kinematics.rotation_rig_from_optical(pan, tilt)
         self._asked = True
         return TrackRequest(self.goal_id, stamp_s, True, (float(x / z), float(y / z)))
 

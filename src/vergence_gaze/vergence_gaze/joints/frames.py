@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from vergence_gaze.joints.shaft_history import ShaftHistory
-from vergence_rig.geometry import eye_position, rotation_rig_from_eye, rotation_rig_from_optical
+from vergence_rig.geometry import ROTATION_EYE_FROM_OPTICAL
+from vergence_rig.kinematics import Kinematics
 
 FRAMES = (
     "rig_base",
@@ -23,7 +24,7 @@ class FrameError(ValueError):
 
 
 def point_in_rig(
-    point_m: Any, frame: str, stamp_s: float, history: ShaftHistory, baseline_m: float
+    point_m: Any, frame: str, stamp_s: float, history: ShaftHistory, kinematics: Kinematics
 ) -> tuple[float, float, float]:
     """Return a point (3,) of `frame` at `stamp_s` (NaN: now) in rig_base [m]. Raises FrameError."""
     name = frame.rsplit("/", 1)[-1] or "rig_base"
@@ -37,7 +38,9 @@ def point_in_rig(
     known = math.isfinite(stamp_s) and history.covers(stamp_s)
     pan_left, pan_right, tilt = history.shaft_at(stamp_s) if known else history.shaft_rad
     left = name.startswith("left")
-    turn = rotation_rig_from_optical if name.endswith("optical_frame") else rotation_rig_from_eye
-    x, y, z = turn(pan_left if left else pan_right, tilt) @ np.asarray(point_m, dtype=float)
-    y += eye_position(left, baseline_m)[1]
+    pan = pan_left if left else pan_right
+    turn = kinematics.rotation_rig_from_camera(left, pan, tilt)
+    if not name.endswith("optical_frame"):
+        turn = turn @ ROTATION_EYE_FROM_OPTICAL.T
+    x, y, z = kinematics.lens(left, pan, tilt) + turn @ np.asarray(point_m, dtype=float)
     return float(x), float(y), float(z)

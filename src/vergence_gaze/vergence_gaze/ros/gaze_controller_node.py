@@ -36,6 +36,8 @@ from vergence_msgs.msg import (
     TrackRequest,
 )
 from vergence_rig.camera import CameraModel, CameraModelError
+from vergence_rig.eye_image import described_camera, eye_images
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig_file import load_rig
 
 _FEEDBACK_EVERY = 10
@@ -50,7 +52,9 @@ class GazeControllerNode(Node):
         settings = declare(self, gaze_groups())
         values = settings.get(GazeNodeParameters)
         self._rig = load_rig(values.rig)
-        self._left, self._right = CameraModel(self._rig.left_camera), CameraModel(self._rig.right_camera)
+        self._kinematics = Kinematics(self._rig)
+        self._cameras = [CameraModel(self._rig.camera(left)) for left in (True, False)]
+        self._images = eye_images(self._rig, (self._cameras[0], self._cameras[1]))
         self._controller = GazeController(self._rig, _parameters(settings), 1.0 / values.control_rate_hz)
         settings.on_change(self._on_parameters)
         self._described: dict[bool, tuple[object, ...]] = {}
@@ -58,7 +62,7 @@ class GazeControllerNode(Node):
         self._newest: GazeReport | None = None
         self._cycles = 0
         self._frames = PointFrames(self, self._controller)
-        self._look_at = LookAtServer(self, self._controller, self._frames, (self._left, self._right))
+        self._look_at = LookAtServer(self, self._controller, self._frames, self._images)
 
         diagnostics = Diagnostics(self)
         diagnostics.add("gaze", self._report)
@@ -77,7 +81,7 @@ class GazeControllerNode(Node):
         )
         watch.create_subscription(TargetTrack, "vergence/track", self._on_track)
         watch.create_subscription(
-            BoxVergence, "vergence/box", lambda m: self._add(convert.box_sighting(m, self._left.fx_px))
+            BoxVergence, "vergence/box", lambda m: self._add(convert.box_sighting(m, self._images[0].fx_px))
         )
         watch.create_subscription(EyeRotation, "vergence/eye_rotation", lambda m: self._add(convert.eye_rotation(m)))
         watch.create_subscription(DetectorClasses, "vergence/detector_classes", self._on_classes, latched)
@@ -106,7 +110,7 @@ class GazeControllerNode(Node):
             # Another tracker says nothing of contrast: vergence/edge does, and costs both sides more.
             self._reads_edges = True
             self._watch.create_subscription(EdgeVergence, "vergence/edge", self._on_edge)
-        self._add(convert.track_sighting(message, self._left))
+        self._add(convert.track_sighting(message, self._images[0]))
 
     def _on_edge(self, message: EdgeVergence) -> None:
         self._add(convert.edge_contrast(message))
@@ -128,18 +132,17 @@ class GazeControllerNode(Node):
         if self._described.get(left) == described:
             return  # it comes with every image
         self._described[left] = described
+        model: CameraModel | None
         try:
             model = convert.camera_model(message)
         except CameraModelError as error:
-            if any(message.k):  # without them it is not calibrated: the rig's description stays
+            if any(message.k):  # without them it is not calibrated, as the metric nodes report
                 eye = "left" if left else "right"
                 self.get_logger().warning(f"{eye}/camera_info is refused, rig.yaml's description is used: {error}")
-            return
-        if left:
-            self._left = model
-        else:
-            self._right = model
-        self._look_at.cameras = (self._left, self._right)
+            model = described_camera(self._rig.camera(left), message.width, message.height)
+        if model is not None:
+            self._cameras[0 if left else 1] = model
+            self._images = self._look_at.images = eye_images(self._rig, (self._cameras[0], self._cameras[1]))
 
     def _cycle(self) -> None:
         now_s = self._now_s()
@@ -156,7 +159,7 @@ class GazeControllerNode(Node):
         if command.joints_rad is not None:
             self._command.publish(convert.joint_command(command.joints_rad, now_s))
         if command.track_request is not None:
-            self._track_requests.publish(convert.track_request(command.track_request, self._left, self._right))
+            self._track_requests.publish(convert.track_request(command.track_request, self._images))
         if self._state.get_subscription_count():
             self._state.publish(convert.gaze_state(report, now_s))
         if math.isfinite(report.fixation_m[0]) and self._fixation.get_subscription_count():
@@ -165,9 +168,9 @@ class GazeControllerNode(Node):
             self._look_at.publish_feedback(report)
         if self._cycles % _MARKERS_EVERY == 0 and self._markers.get_subscription_count():
             half = 0.5 * report.vergence_rad
-            joints = np.array([report.version_rad - half, report.version_rad + half, report.tilt_rad])
-            if np.isfinite(joints).all():
-                self._markers.publish(convert.gaze_markers(joints, report.fixation_m, self._rig.baseline_m, now_s))
+            angles = np.array([report.version_rad - half, report.version_rad + half, report.tilt_rad])
+            if np.isfinite(angles).all():
+                self._markers.publish(convert.gaze_markers(angles, report.fixation_m, self._kinematics, now_s))
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         self._controller.enable(request.data, self._now_s())

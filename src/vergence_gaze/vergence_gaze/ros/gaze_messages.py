@@ -26,7 +26,8 @@ from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack
 from vergence_msgs.msg import TrackRequest as TrackRequestMessage
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import eye_direction, eye_position
+from vergence_rig.eye_image import EyeImage
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import JOINT_NAMES
 from vergence_rig.verged import best_small_window
 
@@ -46,11 +47,11 @@ def joint_resolution(message: JointState) -> JointResolution:
     return JointResolution(to_seconds(message.header.stamp), dict(zip(message.name, message.position, strict=False)))
 
 
-def track_sighting(message: TargetTrack, left_camera: CameraModel) -> TrackSighting:
+def track_sighting(message: TargetTrack, left_image: EyeImage) -> TrackSighting:
     """Return the track in normalised coordinates."""
     both = message.status in (TargetTrack.STATUS_OK, TargetTrack.STATUS_AMBIGUOUS)
     found = both or message.status == TargetTrack.STATUS_OCCLUDED
-    x, y = left_camera.undistort([[message.left_x_px, message.left_y_px]])[0] if found else (math.nan, math.nan)
+    x, y = left_image.undistort([[message.left_x_px, message.left_y_px]])[0] if found else (math.nan, math.nan)
     candidates = zip(message.candidate_disparity_px, message.candidate_weight, strict=True)
     return TrackSighting(
         stamp_s=to_seconds(message.header.stamp),
@@ -60,28 +61,28 @@ def track_sighting(message: TargetTrack, left_camera: CameraModel) -> TrackSight
         left_x=float(x),
         left_y=float(y),
         disparity_rad=message.disparity_rad if both else math.nan,
-        sigma_rad=message.sigma_px / left_camera.fx_px,
-        extent_rad=message.extent_width_px / left_camera.fx_px,
+        sigma_rad=message.sigma_px / left_image.fx_px,
+        extent_rad=message.extent_width_px / left_image.fx_px,
         usable=bool(found and math.isfinite(x) and math.isfinite(y)),
         reason=message.reason,
         goal_id=message.goal_id,
         ambiguous=message.status == TargetTrack.STATUS_AMBIGUOUS,
-        candidates=tuple((math.atan(x) - math.atan(x - px / left_camera.fx_px), weight) for px, weight in candidates),
+        candidates=tuple((math.atan(x) - math.atan(x - px / left_image.fx_px), weight) for px, weight in candidates),
         images_fault=message.reason if message.status == TargetTrack.STATUS_UNUSABLE_IMAGES else "",
     )
 
 
-def track_request(request: TrackRequest, left_camera: CameraModel, right_camera: CameraModel) -> TrackRequestMessage:
+def track_request(request: TrackRequest, images: tuple[EyeImage, EyeImage]) -> TrackRequestMessage:
     """Return the request in raw pixels of the eye's image."""
     message = TrackRequestMessage(goal_id=request.goal_id)
     if request.goal_id:
-        camera = left_camera if request.left_eye else right_camera
+        image = images[0 if request.left_eye else 1]
         message.header.stamp = to_stamp(request.stamp_s)
         message.eye = TrackRequestMessage.EYE_LEFT if request.left_eye else TrackRequestMessage.EYE_RIGHT
-        x_px, y_px = camera.ray_to_pixel(np.array([[*request.xy, 1.0]]))[0]
+        x_px, y_px = image.distort([request.xy])[0]
         message.x_px, message.y_px = float(x_px), float(y_px)
         if np.isfinite(request.extent_rad).all():
-            message.width_px, message.height_px = (camera.fx_px * extent for extent in request.extent_rad)
+            message.width_px, message.height_px = (image.fx_px * extent for extent in request.extent_rad)
     return message
 
 
@@ -147,7 +148,7 @@ def camera_model(message: CameraInfo) -> CameraModel:
     )
 
 
-def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: CameraModel, right: CameraModel) -> Goal:
+def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: EyeImage, right: EyeImage) -> Goal:
     """Return a LookAt goal; `point_m` is its point, already in rig_base. Raises ValueError for an unknown kind."""
     stamp_s = to_seconds(request.header.stamp)
     left_xy = left.undistort([[request.left_x_px, request.left_y_px]])[0]
@@ -237,16 +238,16 @@ def point_stamped(point_m: Array, stamp_s: float) -> PointStamped:
     return PointStamped(header=Header(stamp=to_stamp(stamp_s), frame_id=BASE_FRAME), point=point(point_m))
 
 
-def gaze_markers(joints_rad: Array, fixation_m: Array, baseline_m: float, stamp_s: float) -> MarkerArray:
+def gaze_markers(angles_rad: Array, fixation_m: Array, kinematics: Kinematics, stamp_s: float) -> MarkerArray:
     """Return the two gaze rays, to the fixation point where there is one, and a ball on it, for RViz."""
     header = Header(stamp=to_stamp(stamp_s), frame_id=BASE_FRAME)
     meets = bool(np.isfinite(fixation_m).all())
     markers = []
-    for number, (left, pan) in enumerate(((True, joints_rad[0]), (False, joints_rad[1]))):
+    for number, (left, pan) in enumerate(((True, angles_rad[0]), (False, angles_rad[1]))):
         ray = Marker(header=header, ns="gaze", id=number, type=Marker.ARROW, action=Marker.ADD)
-        origin = eye_position(left, baseline_m)
+        origin, axis = kinematics.lens(left, pan, angles_rad[2]), kinematics.axis(pan, angles_rad[2])
         length = float(np.linalg.norm(fixation_m - origin)) if meets else _RAY_M
-        ray.points = [point(origin), point(origin + min(length, _RAY_M) * eye_direction(pan, joints_rad[2]))]
+        ray.points = [point(origin), point(origin + min(length, _RAY_M) * axis)]
         ray.scale.x, ray.scale.y, ray.scale.z = 0.004, 0.01, 0.02
         ray.pose.orientation.w = 1.0
         ray.color.r, ray.color.g, ray.color.b, ray.color.a = (0.1, 0.5, 1.0, 0.9) if left else (1.0, 0.4, 0.1, 0.9)

@@ -14,19 +14,19 @@ from vergence_gaze.goals.requested_class import check_class
 from vergence_gaze.ros import gaze_messages as convert
 from vergence_gaze.ros.point_frames import PointFrames
 from vergence_msgs.action import LookAt
-from vergence_rig.camera import CameraModel
+from vergence_rig.eye_image import EyeImage
 
 
 class LookAtServer:
-    """Serves the action on a node; `cameras`, left and right, may be replaced at any time.
+    """Serves the action on a node; `images`, left and right, may be replaced at any time.
 
     So may `classes`, those that the detector looks for; None while that is not known.
     """
 
     def __init__(
-        self, node: Node, controller: GazeController, frames: PointFrames, cameras: tuple[CameraModel, CameraModel]
+        self, node: Node, controller: GazeController, frames: PointFrames, images: tuple[EyeImage, EyeImage]
     ) -> None:
-        self.cameras = cameras
+        self.images = images
         self.classes: tuple[str, ...] | None = None
         self._node, self._controller, self._frames = node, controller, frames
         self._goals: dict[int, ServerGoalHandle] = {}
@@ -70,7 +70,7 @@ class LookAtServer:
             is_point = request.kind == LookAt.Goal.POINT
             frame = request.header.frame_id
             place = self._frames.in_rig(request.point, frame, stamp_s) if is_point else (math.nan,) * 3
-            goal = convert.goal(request, place, *self.cameras)
+            goal = convert.goal(request, place, *self.images)
             check_class(goal, self.classes)
         except ValueError as error:
             self._end(handle, Outcome(0, Result.INVALID, str(error), 0.0))

@@ -21,6 +21,7 @@ from vergence_gaze.estimation.observations import (
     Observation,
     TrackSighting,
 )
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_rig.servo import ServoPlant, ServoSpec
 
@@ -56,6 +57,8 @@ class VisionModel:
 class FakeHead:
     """Rig, true servos, target and eyes. `visible(t)` hides the target; `target(t)` gives it (3,) in rig_base [m].
 
+    `built` is the head as it is built, where it differs from the description that the controller has.
+
     `mistaken` gives, by estimator ("fovea" for the contrast, "track", "box"), the point that it measures instead of the
     target at `t`, or None while it is right. `servos` are the real servos by joint, where they differ from the rig's
     description. Time starts at `begin_s`.
@@ -71,8 +74,11 @@ class FakeHead:
     servos: Mapping[str, ServoSpec] = field(default_factory=dict)
     begin_s: float = 0.0
     report_ticks: int = 6
+    built: Rig | None = None
 
     def __post_init__(self) -> None:
+        self._built = self.built or self.rig
+        self._kinematics = Kinematics(self._built)
         self._random = np.random.default_rng(self.seed)
         self._ticks = 0
         self._order = itertools.count()
@@ -97,8 +103,8 @@ class FakeHead:
 
     @property
     def true_rad(self) -> Array:
-        """The true joint angles (3,), pan_left, pan_right, tilt."""
-        return np.array([self._plants[name].true_rad for name in JOINT_NAMES])
+        """The true eye angles (3,), pan_left, pan_right, tilt."""
+        return np.array(self._built.eye_angles([self._plants[name].true_rad for name in JOINT_NAMES]))
 
     def command(self, joints_rad: Array) -> None:
         """Command the joints (3,)."""
@@ -120,15 +126,12 @@ class FakeHead:
 
     def true_errors_rad(self) -> Array:
         """Return (version, vergence, tilt) to the target minus the true ones (3,)."""
-        x, y, z = self.target(self.time_s)
-        forward, half = math.hypot(x, z), 0.5 * self.rig.baseline_m
-        left, right = math.atan2(y - half, forward), math.atan2(y + half, forward)
-        true = self.true_rad
+        wanted, true = self._kinematics.gaze_for_point(self.target(self.time_s)), self.true_rad
         return np.array(
             [
-                0.5 * (left + right) - 0.5 * (true[0] + true[1]),
-                (right - left) - (true[1] - true[0]),
-                math.atan2(-z, x) - true[2],
+                wanted.version_rad - 0.5 * (true[0] + true[1]),
+                wanted.vergence_rad - (true[1] - true[0]),
+                wanted.tilt_rad - true[2],
             ]
         )
 
@@ -156,11 +159,9 @@ class FakeHead:
     def project(self, point_m: Array, left: bool) -> Array:
         """Return normalised image coordinates (2,), x right, y down, of a point; NaN behind the eye."""
         pan, tilt = self.true_rad[0 if left else 1], self.true_rad[2]
-        x, y, z = point_m
-        y = y - (0.5 if left else -0.5) * self.rig.baseline_m
-        forward, up = math.cos(tilt) * x - math.sin(tilt) * z, math.sin(tilt) * x + math.cos(tilt) * z
-        ahead, aside = math.cos(pan) * forward + math.sin(pan) * y, -math.sin(pan) * forward + math.cos(pan) * y
-        return np.array([-aside / ahead, -up / ahead]) if ahead > 1e-6 else np.full(2, math.nan)
+        ray = np.asarray(point_m) - self._kinematics.lens(left, pan, tilt)
+        x, y, z = (ray @ self._kinematics.rotation_rig_from_optical(pan, tilt)).tolist()
+        return np.array([x / z, y / z]) if z > 1e-6 else np.full(2, math.nan)
 
     def _project(self, left: bool) -> Array:
         return self.project(self.target(self.time_s), left)

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,8 +22,11 @@ from vergence_metric.boxes.smoothing import LagLimitedFilter
 from vergence_metric.boxes.target_point import TargetPoint, locate
 from vergence_metric.boxes.uncertainty import direction_sigma_px, disparity_sigma_px
 from vergence_metric.disparity.angular_disparity import angular_disparity
+from vergence_metric.edges.edges import to_grey
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
+from vergence_rig.kinematics import Kinematics
+from vergence_rig.rig import default_rig
 
 Models = tuple[CameraModel, CameraModel]
 
@@ -41,13 +43,13 @@ class BoxMeasurement:
     def __init__(
         self,
         parameters: BoxMetricParameters,
-        baseline_m: float,
+        kinematics: Kinematics,
         detector: Detector | None = None,
         threads: int = 1,
     ) -> None:
         """Load the detector that the parameters name, on `threads` threads, unless one is given; raises its errors."""
         self.detector = detector or Detector(parameters.detector, threads)
-        self._baseline_m = baseline_m
+        self._kinematics = kinematics
         self._memory = TargetMemory(parameters.follow)
         self._vertical_px, self._vertical_count = 0.0, 0
         self._parameters = parameters
@@ -101,7 +103,7 @@ class BoxMeasurement:
         models: Models | None,
     ) -> BoxVergenceResult:
         """Return metric II of what was detected in a pair; see `measure`."""
-        geometry = PairGeometry(*models, eyes) if models is not None and eyes is not None else None
+        geometry = PairGeometry(*models, eyes, self._kinematics) if models is not None and eyes is not None else None
         expected = self._memory.expected(stamp_s, geometry)
         found = associate(
             seen[0].boxes(),
@@ -157,7 +159,7 @@ class BoxMeasurement:
     ) -> BoxVergenceResult:
         p = self._parameters.measurement
         left, right = self._smoothed(pair, stamp_s)
-        refined = refine(_grey(images[0]), _grey(images[1]), left, right) if p.refine else UNREFINED
+        refined = refine(to_grey(images[0]), to_grey(images[1]), left, right) if p.refine else UNREFINED
         expected_vertical = self._vertical_px
         if geometry is not None:
             expected_vertical += geometry.vertical_px(left.center_px, right.center_px[0])
@@ -210,7 +212,7 @@ class BoxMeasurement:
         right_px = left.center_px[0] - disparity[0], left.center_px[1] - disparity[1]
         sigmas = (direction_sigma_px(left, source_per_input), sigma, JOINT_SIGMA_RAD)
         return locate(
-            left.center_px, right_px, (geometry.left, geometry.right), geometry.eyes, self._baseline_m, sigmas
+            left.center_px, right_px, (geometry.left, geometry.right), geometry.eyes, self._kinematics, sigmas
         )
 
     def _smoothed(self, pair: BoxPair, stamp_s: float) -> tuple[Box, Box]:
@@ -245,11 +247,7 @@ def measure_pair(
     """
     chosen = parameters or BoxMetricParameters()
     chosen = replace(chosen, detector=chosen.detector.replaced(model=str(model_path)))
-    return BoxMeasurement(chosen, baseline_m=math.nan).measure(left_bgr, right_bgr, models=models)
-
-
-def _grey(image: NDArray[Any]) -> NDArray[np.uint8]:
-    return np.asarray(image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
+    return BoxMeasurement(chosen, Kinematics(default_rig())).measure(left_bgr, right_bgr, models=models)
 
 
 def _angles(model: CameraModel | None, box: Box | None) -> tuple[float, float]:

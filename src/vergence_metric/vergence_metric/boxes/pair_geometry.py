@@ -6,18 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import EyeAngles, rotation_rig_from_optical
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.kinematics import Kinematics
 
 Pixel = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class PairGeometry:
-    """Both cameras and the joint angles at the images' stamps. Pixels are raw."""
+    """Both cameras, the eye angles at the images' stamps, and the head's kinematics."""
 
     left: CameraModel
     right: CameraModel
     eyes: EyeAngles
+    kinematics: Kinematics
 
     def direction(self, left_eye: bool, pixel: Pixel) -> np.ndarray:
         """Return the unit direction (3,) in rig_base of one eye's pixel."""
@@ -40,7 +42,7 @@ class PairGeometry:
 
         Both eyes, and every point on the left ray, lie in one plane; it cuts the right image in a line.
         """
-        baseline = np.array([0.0, 1.0, 0.0])
+        baseline = self._lens(True) - self._lens(False)
         normal = self._rotation(False).T @ np.cross(baseline, self.direction(True, left_px))
         if abs(normal[1]) < 1e-6:
             return 0.0
@@ -49,6 +51,11 @@ class PairGeometry:
         v = float(self.right.distort([(x, y)])[0][1])
         return left_px[1] - v if math.isfinite(v) else 0.0
 
+    def _lens(self, left_eye: bool) -> np.ndarray:
+        return self.kinematics.lens(left_eye, self._pan_rad(left_eye), self.eyes.tilt_rad)
+
     def _rotation(self, left_eye: bool) -> np.ndarray:
-        pan_rad = self.eyes.pan_left_rad if left_eye else self.eyes.pan_right_rad
-        return np.asarray(rotation_rig_from_optical(pan_rad, self.eyes.tilt_rad))
+        return self.kinematics.rotation_rig_from_optical(self._pan_rad(left_eye), self.eyes.tilt_rad)
+
+    def _pan_rad(self, left_eye: bool) -> float:
+        return self.eyes.pan_left_rad if left_eye else self.eyes.pan_right_rad

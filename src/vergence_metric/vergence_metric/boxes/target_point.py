@@ -9,13 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import (
-    EyeAngles,
-    GeometryError,
-    eye_position,
-    nearest_points_of_rays,
-    rotation_rig_from_optical,
-)
+from vergence_rig.geometry import EyeAngles, GeometryError, nearest_points_of_rays
+from vergence_rig.kinematics import Kinematics
 
 Array = NDArray[np.float64]
 
@@ -33,17 +28,17 @@ def locate(
     right_px: tuple[float, float],
     cameras: tuple[CameraModel, CameraModel],
     eyes: EyeAngles,
-    baseline_m: float,
+    kinematics: Kinematics,
     sigmas: tuple[float, float, float],
 ) -> TargetPoint | None:
     """Triangulate one point seen by both eyes; None where the rays do not meet in front.
 
     Args:
-        left_px: (x, y) of it in the left image, raw.
+        left_px: (x, y) of it in the left image.
         right_px: in the right image.
         cameras: left and right.
         eyes: joint angles at the images' stamps.
-        baseline_m: between the eyes.
+        kinematics: of the head.
         sigmas: standard deviations of a direction common to both eyes [px], of the disparity [px], and of each joint
             angle [rad].
 
@@ -56,7 +51,7 @@ def locate(
         moved = EyeAngles(eyes.pan_left_rad + offsets[3], eyes.pan_right_rad + offsets[4], eyes.tilt_rad + offsets[5])
         left = (left_px[0] + offsets[0], left_px[1] + offsets[1])
         right = (right_px[0] + offsets[0] - offsets[2], right_px[1] + offsets[1])
-        return _meeting(left, right, cameras, moved, baseline_m)
+        return _meeting(left, right, cameras, moved, kinematics)
 
     try:
         center = point(np.zeros(6))
@@ -76,13 +71,13 @@ def _meeting(
     right_px: tuple[float, float],
     cameras: tuple[CameraModel, CameraModel],
     eyes: EyeAngles,
-    baseline_m: float,
+    kinematics: Kinematics,
 ) -> Array:
-    rays = [
-        rotation_rig_from_optical(pan, eyes.tilt_rad) @ camera.pixel_to_ray([pixel])[0]
-        for camera, pan, pixel in zip(
-            cameras, (eyes.pan_left_rad, eyes.pan_right_rad), (left_px, right_px), strict=True
-        )
-    ]
-    a, b = nearest_points_of_rays(eye_position(True, baseline_m), rays[0], eye_position(False, baseline_m), rays[1])
+    meeting = []
+    for left, camera, pan, pixel in zip(
+        (True, False), cameras, (eyes.pan_left_rad, eyes.pan_right_rad), (left_px, right_px), strict=True
+    ):
+        turn = kinematics.rotation_rig_from_optical(pan, eyes.tilt_rad)
+        meeting += [kinematics.lens(left, pan, eyes.tilt_rad), turn @ camera.pixel_to_ray([pixel])[0]]
+    a, b = nearest_points_of_rays(*meeting)
     return np.asarray(0.5 * (a + b))

@@ -5,10 +5,10 @@ import time
 from dataclasses import dataclass
 from enum import IntEnum
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vergence_metric.edges.edges import to_grey
 from vergence_metric.eye_rotation.epipolar_view import epipolar_view
 from vergence_metric.eye_rotation.matching import MatchingSettings, matches
 from vergence_metric.eye_rotation.parameters import EncoderParameters
@@ -20,6 +20,7 @@ from vergence_metric.eye_rotation.relative_rotation import (
 )
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
+from vergence_rig.kinematics import Kinematics, rotation_pan_from_camera
 from vergence_rig.rig import Rig
 
 Pixels = npt.NDArray[np.uint8]
@@ -69,9 +70,11 @@ class VisualEncoder:
 
     def __init__(self, parameters: EncoderParameters, rig: Rig) -> None:
         self._p = parameters
-        self._baseline_m = rig.baseline_m
+        self._kinematics = Kinematics(rig)
+        self._mounts = (rotation_pan_from_camera(rig.left_mount), rotation_pan_from_camera(rig.right_mount))
         servos = (rig.joints.pan_left.servo, rig.joints.pan_right.servo)
-        self._servo_uncertainty_rad = sum(servo.uncertainty_rad for servo in servos)
+        self._servo_uncertainty_rad = sum(servo.uncertainty_rad for servo in servos) + rig.zero_error_rad
+        self._zero_sigma_rad = rig.zero_sigma_rad
         self._pan_sigma_rad = _UNIFORM_TO_SIGMA * max(servo.uncertainty_rad for servo in servos)
 
     @property
@@ -84,16 +87,21 @@ class VisualEncoder:
 
         Args:
             left: (h, w, 3) BGR or (h, w) grey image of the left eye.
-            right: the same of the right eye, of one size with it.
-            eyes: joint angles at the images' stamps.
-            models: the left and the right camera, for images of this size.
+            right: the same of the right eye.
+            eyes: eye angles at the images' stamps.
+            models: the left and the right camera, each for images of its size.
 
         """
         began_s = time.perf_counter()
-        step_rad = 1.0 / models[0].fx_px
+        step_rad, size_px = 1.0 / models[0].fx_px, (models[0].width_px, models[0].height_px)
+        # Where lenses lie before their axes, the line through both turns with the eyes.
+        lens = self._kinematics.lens
+        across = lens(True, eyes.pan_left_rad, 0.0) - lens(False, eyes.pan_right_rad, 0.0)
+        turned_rad = math.atan2(float(across[0]), float(across[1]))
+        pans = (eyes.pan_left_rad + turned_rad, eyes.pan_right_rad + turned_rad)
         views = [
-            epipolar_view(_grey(image), camera, pan, step_rad)
-            for image, camera, pan in zip((left, right), models, (eyes.pan_left_rad, eyes.pan_right_rad), strict=True)
+            epipolar_view(to_grey(image), camera, pan, step_rad, mount, size_px)
+            for image, camera, pan, mount in zip((left, right), models, pans, self._mounts, strict=True)
         ]
         found = matches(views[0], views[1], self._matching())
         rotation = None
@@ -101,9 +109,7 @@ class VisualEncoder:
             plane = [
                 view.to_image_plane(points) for view, points in zip(views, (found.left_px, found.right_px), strict=True)
             ]
-            rotation = relative_rotation(
-                plane[0], plane[1], eyes.pan_left_rad, eyes.pan_right_rad, self._prior(step_rad)
-            )
+            rotation = relative_rotation(plane[0], plane[1], *pans, self._prior(step_rad))
         status, reason = self._accepted(rotation, len(found.left_px), found.corners, step_rad, eyes)
         return EyeRotationReading(
             status,
@@ -119,7 +125,7 @@ class VisualEncoder:
     def _matching(self) -> MatchingSettings:
         return MatchingSettings(
             features=self._p.matching.features,
-            nearest_parallax_rad=2.0 * math.atan(0.5 * self._baseline_m / self._p.matching.nearest_m),
+            nearest_parallax_rad=2.0 * math.atan(0.5 * self._kinematics.baseline_m / self._p.matching.nearest_m),
             aside_rad=self.max_deviation_rad,
             rows_px=round(self._p.matching.row_search_px),
             score=self._p.matching.min_score,
@@ -129,7 +135,7 @@ class VisualEncoder:
     def _prior(self, step_rad: float) -> RigPrior:
         return RigPrior(
             vergence_rad=_VERGENCE_SIGMAS * self.max_deviation_rad,
-            pan_rad=math.hypot(self._pan_sigma_rad, 0.5 * self._p.acceptance.mount_tolerance_rad),
+            pan_rad=math.hypot(self._pan_sigma_rad, 0.5 * self._p.acceptance.mount_tolerance_rad, self._zero_sigma_rad),
             focal=self._p.prior.focal_sigma,
             distortion=self._p.prior.distortion_sigma,
             centre_rad=self._p.prior.centre_sigma_px * step_rad,
@@ -173,7 +179,3 @@ class VisualEncoder:
 def not_measured(status: EyeRotationStatus, reason: str, eyes: EyeAngles | None = None) -> EyeRotationReading:
     """Return the reading of a pair that was not measured, with the reason."""
     return EyeRotationReading(status, reason, math.nan if eyes is None else eyes.vergence_rad)
-
-
-def _grey(image: npt.NDArray[np.uint8]) -> Pixels:
-    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)

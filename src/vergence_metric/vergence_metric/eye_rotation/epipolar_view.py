@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import rotation_rig_from_eye
+from vergence_rig.geometry import ROTATION_EYE_FROM_OPTICAL, rotation_rig_from_eye
 
 Array = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.uint8]
@@ -43,17 +43,29 @@ class EpipolarView:
         return np.asarray(-rays[:, 1:] / rays[:, :1])
 
 
-def epipolar_view(grey: Pixels, camera: CameraModel, pan_rad: float, step_rad: float) -> EpipolarView:
-    """Return a grey image (h, w) of an eye panned by `pan_rad`, resampled over the bar's angles, `step_rad` a pixel."""
-    shape = (round(grey.shape[0] * _HEIGHT_SHARE), grey.shape[1])
+def epipolar_view(
+    grey: Pixels,
+    camera: CameraModel,
+    pan_rad: float,
+    step_rad: float,
+    eye_from_camera: Array = ROTATION_EYE_FROM_OPTICAL,
+    size_px: tuple[int, int] | None = None,
+) -> EpipolarView:
+    """Return a grey image (h, w) of an eye panned by `pan_rad`, resampled over the bar's angles, `step_rad` a pixel.
+
+    `eye_from_camera` (3, 3) is how the camera is turned on its pan axis, from its optical frame; `size_px` (width,
+    height) is that of the image whose view has the same shape, by default this one.
+    """
+    columns, rows = size_px or (grey.shape[1], grey.shape[0])
+    shape = (round(rows * _HEIGHT_SHARE), columns)
     bar_from_eye = rotation_rig_from_eye(pan_rad, 0.0)
     # The map from angles to pixels is smooth: it is computed at nodes and interpolated in between.
-    rows, columns = (np.arange(0, size + _NODE_PX, _NODE_PX, dtype=np.float64) for size in shape)
-    x, y = np.meshgrid(columns, rows)
+    down, across = (np.arange(0, size + _NODE_PX, _NODE_PX, dtype=np.float64) for size in shape)
+    x, y = np.meshgrid(across, down)
     nodes = np.column_stack([x.ravel(), y.ravel()])
     rays = _rays(nodes, shape, pan_rad, step_rad) @ bar_from_eye
-    pixels = camera.ray_to_pixel(np.column_stack([-rays[:, 1], -rays[:, 2], rays[:, 0]]))
-    pixels = np.nan_to_num(pixels, nan=_OUTSIDE).reshape(len(rows), len(columns), 2)
+    pixels = camera.ray_to_pixel(rays @ eye_from_camera)
+    pixels = np.nan_to_num(pixels, nan=_OUTSIDE).reshape(len(down), len(across), 2)
     maps = [_between(np.ascontiguousarray(pixels[:, :, axis]), shape) for axis in (0, 1)]
     drawn = cv2.remap(grey, maps[0], maps[1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     height, width = grey.shape

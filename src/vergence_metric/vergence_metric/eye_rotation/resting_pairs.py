@@ -2,10 +2,7 @@
 
 from typing import Any
 
-import cv2
-import numpy as np
-import numpy.typing as npt
-
+from vergence_metric.edges.edges import to_grey
 from vergence_metric.eye_rotation.encoder import EyeRotationReading, EyeRotationStatus, VisualEncoder, not_measured
 from vergence_metric.eye_rotation.parameters import RestParameters
 from vergence_metric.eye_rotation.rest import joints_moved, view_moved
@@ -35,11 +32,9 @@ def measure_pair(
     moved = joints_moved(joints, min(stamps), max(stamps), rest)
     if not moved:
         interval_s = (pair.left_stamp_ns - before.left_stamp_ns) * 1e-9
-        moved = view_moved(_grey(before.left.pixels), _grey(pair.left.pixels), interval_s, pair.skew_ns * 1e-9, rest)
+        moved = view_moved(
+            to_grey(before.left.pixels), to_grey(pair.left.pixels), interval_s, pair.skew_ns * 1e-9, rest
+        )
     if moved:
         return not_measured(EyeRotationStatus.MOVING, moved, eyes)
     return encoder.measure(pair.left.pixels, pair.right.pixels, eyes, models)
-
-
-def _grey(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)

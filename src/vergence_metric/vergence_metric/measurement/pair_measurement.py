@@ -20,22 +20,23 @@ from vergence_metric.tracking.request import PairMemory, StoredPair, TrackReques
 from vergence_metric.tracking.saccade_detector import StampedEyeAngles
 from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_rig.camera import CameraModel
+from vergence_rig.eye_image import eye_images
 from vergence_rig.geometry import EyeAngles
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
 _SAME_IMAGE_S = 0.1  # a request is for the pair nearest to its stamp, at most this far from it
-
-Models = tuple[CameraModel, CameraModel]
 
 
 class PairMeasurement:
     """Metric I, the fovea's signed disparity and the followed target of successive pairs, in order of their stamps."""
 
     def __init__(self, parameters: PairMeasurementParameters, rig: Rig) -> None:
-        self._baseline_m = rig.baseline_m
-        self._rig_models = (CameraModel(rig.left_camera), CameraModel(rig.right_camera))
+        self._kinematics = Kinematics(rig)
+        described = eye_images(rig, (CameraModel(rig.left_camera), CameraModel(rig.right_camera)))
+        self._rig_camera = described[0].ideal
         self._tracker: Tracker | None = None
-        self._models: Models | None = None
+        self._camera: CameraModel | None = None
         self._memory = PairMemory(parameters.tracker.memory_s)
         self._requests: deque[TrackRequest] = deque()
         self._ids_used = 0
@@ -81,8 +82,8 @@ class PairMeasurement:
 
     def verged(self, edge: EdgeMetricResult, error_px: float, confidence: float) -> bool:
         """Return whether the eyes are verged, by contrast, signed error, and the result of the last pair."""
-        left, _ = self._models or self._rig_models
-        return self._classifier.update(edge.least_contrast.contrast, math.atan(error_px / left.fx_px), confidence)
+        camera = self._camera or self._rig_camera
+        return self._classifier.update(edge.least_contrast.contrast, math.atan(error_px / camera.fx_px), confidence)
 
     def request_track(self, request: TrackRequest) -> None:
         """Let the tracker follow a point, from the next pair on; may be called from another thread."""
@@ -93,7 +94,7 @@ class PairMeasurement:
         edge: EdgeMetricResult,
         stamp_s: float,
         eyes: EyeAngles | None,
-        models: Models | None,
+        camera: CameraModel | None,
         samples: Iterable[StampedEyeAngles] = (),
         unknown_joints: str = "no joint_states at the image's stamp",
     ) -> Track:
@@ -103,23 +104,23 @@ class PairMeasurement:
             edge: the pair.
             stamp_s: of the left image.
             eyes: joint angles at the images' stamps, None if there are none.
-            models: both cameras; None uses those of the rig, if they are for images of this size.
+            camera: the ideal one of both images; None uses that of the rig, if it is for images of this size.
             samples: joint angles since the pair before, in order of their stamps [s].
             unknown_joints: why `eyes` is None, if it is.
         """
         height, width = edge.left_grey.shape
-        models = models or self._rig_models
-        if any((model.width_px, model.height_px) != (width, height) for model in models):
+        camera = camera or self._rig_camera
+        if (camera.width_px, camera.height_px) != (width, height):
             return self._unlocked(f"no calibration for {width}x{height} images")
         if eyes is None:
             return self._unlocked(unknown_joints)
-        if self._tracker is None or models != self._models:
-            self._models, self._ids_used = models, self._newest_id
-            self._tracker = make_tracker(self._parameters.tracker, self._estimator, *models, self._baseline_m)
+        if self._tracker is None or self._camera is None or not camera.equals(self._camera):
+            self._camera, self._ids_used = camera, self._newest_id
+            self._tracker = make_tracker(self._parameters.tracker, self._estimator, camera, self._kinematics)
         self._pass_on_requests(self._tracker, edge)
         views = tuple(
-            EyeView(model, pan_rad, eyes.tilt_rad)
-            for model, pan_rad in zip(models, (eyes.pan_left_rad, eyes.pan_right_rad), strict=True)
+            EyeView(camera, pan_rad, eyes.tilt_rad, self._kinematics.pitch_rad)
+            for pan_rad in (eyes.pan_left_rad, eyes.pan_right_rad)
         )
         self._memory.add(StoredPair(stamp_s, edge.left_grey, edge.right_grey, (views[0], views[1])))
         track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes, samples)

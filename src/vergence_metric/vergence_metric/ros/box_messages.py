@@ -12,6 +12,7 @@ from vergence_metric.boxes.detections import Box, Detections
 from vergence_metric.boxes.result import BoxVergenceResult
 from vergence_metric.boxes.target_point import TargetPoint
 from vergence_msgs.msg import BoundingBox, BoxVergence, StereoDetections
+from vergence_rig.eye_image import EyeImage
 
 POINT_FRAME = "rig_base"
 
@@ -106,14 +107,22 @@ def vision_type() -> Any:
         return None
 
 
-def vision_message(detections: Detections, header: Header) -> Any:
-    """Return one eye's detections as vision_msgs/Detection2DArray; only where `vision_type` is one."""
+def vision_message(detections: Detections, image: EyeImage | None, header: Header) -> Any:
+    """Return one eye's detections as vision_msgs/Detection2DArray, in its image as it was taken.
+
+    Only where `vision_type` is one. `image` is None without camera models.
+    """
     kinds = importlib.import_module("vision_msgs.msg")
     message = kinds.Detection2DArray(header=header)
     for box in detections:
         detection = kinds.Detection2D(header=header)
-        detection.bbox.center.position.x, detection.bbox.center.position.y = box.center_px
-        detection.bbox.size_x, detection.bbox.size_y = box.size_px
+        x_min, y_min, x_max, y_max = box.xyxy_px
+        if image is not None:
+            corners = image.to_camera([(x_min, y_min), (x_max, y_min), (x_min, y_max), (x_max, y_max)])
+            (x_min, y_min), (x_max, y_max) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        detection.bbox.center.position.x = 0.5 * (x_min + x_max)
+        detection.bbox.center.position.y = 0.5 * (y_min + y_max)
+        detection.bbox.size_x, detection.bbox.size_y = x_max - x_min, y_max - y_min
         hypothesis = kinds.ObjectHypothesisWithPose()
         hypothesis.hypothesis.class_id, hypothesis.hypothesis.score = box.class_name, box.score
         detection.results.append(hypothesis)

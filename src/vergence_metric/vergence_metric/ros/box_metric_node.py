@@ -33,8 +33,9 @@ from vergence_metric.ros.box_messages import (
     vision_type,
 )
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
-from vergence_metric.ros.stereo_input import ImagePair, StereoInput
+from vergence_metric.ros.stereo_input import IdealPair, ImagePair, StereoInput
 from vergence_msgs.msg import BoxVergence, DetectorClasses, StereoDetections
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.parameters import ParameterError
 from vergence_rig.rig_file import load_rig
 
@@ -49,9 +50,9 @@ class BoxMetricNode(MetricNode):
         self._settings = declare(self, GROUPS)
         settings: BoxMetricNodeParameters = self._settings.value
         limit_threads(settings.threads)
-        rig = load_rig(settings.rig)
+        self._rig = load_rig(settings.rig)
         self._metric_parameters = _parameters_of(self._settings)
-        self._measurement = BoxMeasurement(self._metric_parameters, rig.baseline_m, threads=settings.threads)
+        self._measurement = BoxMeasurement(self._metric_parameters, Kinematics(self._rig), threads=settings.threads)
         self.get_logger().info(self._measurement.detector.describe())
         self._counts: dict[str, int] = {}
         self._due_ns = 0
@@ -73,7 +74,9 @@ class BoxMetricNode(MetricNode):
             self._measure, self._on_failure, "measure", settings.niceness
         )
         pairing = self._settings.get(PairingParameters)
-        self._stereo = StereoInput(self, settings, pairing, diagnostics, qos, self._on_pair, images=self._images)
+        self._stereo = StereoInput(
+            self, settings, pairing, diagnostics, qos, self._on_pair, self._rig, images=self._images
+        )
         self._joint_input = self._subscribe_joints(diagnostics, qos)
         self._settings.add_check(self._check_classes)
         self._settings.on_change(self._on_settings)
@@ -116,16 +119,15 @@ class BoxMetricNode(MetricNode):
     def _measure(self, pair: ImagePair) -> None:
         self._measurement.set_parameters(self._metric_parameters)
         eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
-        models = self._stereo.models_for(pair.left.pixels)
+        with self._times.measure("ideal_images"):
+            ideal = self._stereo.ideal(pair)
         with self._times.measure("metric"):
-            result = self._measurement.measure(
-                pair.left.pixels, pair.right.pixels, pair.left_stamp_ns * 1e-9, eyes, models
-            )
-        self._publish(pair, result)
+            result = self._measurement.measure(ideal.left, ideal.right, pair.left_stamp_ns * 1e-9, eyes, ideal.cameras)
+        self._publish(pair, ideal, result)
         self._counts[result.status.name] = self._counts.get(result.status.name, 0) + 1
         self._failure = None
 
-    def _publish(self, pair: ImagePair, result: BoxVergenceResult) -> None:
+    def _publish(self, pair: ImagePair, ideal: IdealPair, result: BoxVergenceResult) -> None:
         header: Header = pair.left.header
         skew_s = pair.skew_ns * 1e-9
         self._box_publisher.publish(box_vergence_message(result, header, skew_s))
@@ -134,12 +136,14 @@ class BoxMetricNode(MetricNode):
         if self._detections_publisher.get_subscription_count():
             self._detections_publisher.publish(detections_message(result, header, skew_s))
         seen = (result.left_detections, result.right_detections)
-        for publisher, detections, image in zip(self._vision_publishers, seen, (pair.left, pair.right), strict=False):
+        eye_images, frames = ideal.eye_images or (None, None), (pair.left, pair.right)
+        of_eyes = zip(seen, eye_images, frames, strict=True)
+        for publisher, (detections, eye_image, frame) in zip(self._vision_publishers, of_eyes, strict=False):
             if publisher.get_subscription_count():
-                publisher.publish(vision_message(detections, image.header))
+                publisher.publish(vision_message(detections, eye_image, frame.header))
         if self._overlay_publisher.get_subscription_count():
             with self._times.measure("overlay"):
-                picture = draw(pair.left.pixels, pair.right.pixels, result)
+                picture = draw(ideal.left, ideal.right, result)
                 self._overlay_publisher.publish(array_to_image(picture, header))
 
     def _report(self) -> Report:

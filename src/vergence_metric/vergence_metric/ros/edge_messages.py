@@ -56,7 +56,7 @@ def error_message(
     )
     if angular is None and disparity.ok:
         message.status = VergenceError.STATUS_NO_CAMERA_INFO
-        message.reason = "no camera_info for images of this size yet: angles are NaN"
+        message.reason = "neither camera_info nor rig.yaml describes cameras for images of this shape: angles are NaN"
     return message
 
 

@@ -19,15 +19,16 @@ from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.edges.parameters import ContrastParameters, EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.measurement.overlay import draw_overlay
-from vergence_metric.measurement.pair_measurement import Models, PairMeasurement
+from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import GROUPS, PairMeasurementParameters, VergedParameters
 from vergence_metric.pairs.eye_order import EyeOrderMonitor
+from vergence_metric.pairs.ideal_images import Models
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.pairs.picture_faults import PictureMonitor
 from vergence_metric.ros.edge_messages import edge_message, error_message, unusable_edge_message, unusable_error_message
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
-from vergence_metric.ros.stereo_input import ImagePair, StereoInput
+from vergence_metric.ros.stereo_input import IdealPair, ImagePair, StereoInput
 from vergence_metric.ros.track_messages import track_message, track_request, unusable_track_message
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
@@ -44,7 +45,8 @@ class EdgeMetricNode(MetricNode):
         self._settings = declare(self, GROUPS)
         stereo = self._settings.get(StereoParameters)
         limit_threads(stereo.threads)
-        self._measurement = PairMeasurement(_measurement_parameters(self._settings), load_rig(stereo.rig))
+        self._rig = load_rig(stereo.rig)
+        self._measurement = PairMeasurement(_measurement_parameters(self._settings), self._rig)
         self._pictures, self._order = PictureMonitor(), EyeOrderMonitor()
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
@@ -54,7 +56,8 @@ class EdgeMetricNode(MetricNode):
         self._overlay_publisher = self._output(qos, Image, "vergence/overlay", IMAGE_QOS)
         self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure")
         pairing = self._settings.get(PairingParameters)
-        self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, self._worker.submit, images=self._images)
+        submit = self._worker.submit
+        self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, submit, self._rig, images=self._images)
         self._joint_input = self._subscribe_joints(diagnostics, qos)
         self._request_subscription = qos.create_subscription(TrackRequest, "vergence/track_request", self._on_request)
         self._settings.on_change(self._on_settings)
@@ -68,7 +71,7 @@ class EdgeMetricNode(MetricNode):
         self._stereo.set_parameters(stereo, settings.get(PairingParameters))
 
     def _on_request(self, message: TrackRequest) -> None:
-        self._measurement.request_track(track_request(message))
+        self._measurement.request_track(track_request(message, self._stereo.eye_images))
 
     def _measure(self, pair: ImagePair) -> None:
         self._measurement.set_parameters(_measurement_parameters(self._settings))
@@ -78,30 +81,32 @@ class EdgeMetricNode(MetricNode):
         if fault is not None and fault.unusable:
             self._publish_unusable(fault.reason, header, skew_s)
             return
-        models = self._stereo.models_for(pair.left.pixels)
+        with self._times.measure("ideal_images"):
+            ideal = self._stereo.ideal(pair, grey=True)
+        models = ideal.cameras
         with self._times.measure("pictures"):
-            self._update_order(pair, models)
+            self._update_order(pair, ideal)
         with self._times.measure("metric"):
-            edge = self._measurement.edge(pair.left.pixels, pair.right.pixels)
+            edge = self._measurement.edge(ideal.left, ideal.right)
         if self._edge_publisher.get_subscription_count() or self._error_publisher.get_subscription_count():
             self._publish_fovea(edge, models, header, skew_s)
         self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)
         self._times.add_all(edge.stage_s)
-        self._publish_track(pair, edge, models)
+        self._publish_track(pair, edge, ideal)
         if self._overlay_publisher.get_subscription_count():
             with self._times.measure("overlay"):
                 disparity = self._measurement.disparity(edge)
-                picture = draw_overlay(pair.left.pixels, edge, disparity)
+                picture = draw_overlay(self._stereo.ideal(pair).left, edge, disparity)
                 self._overlay_publisher.publish(array_to_image(picture, header))
         self._measurement.update_alignment()
         self._failure = None
 
-    def _update_order(self, pair: ImagePair, models: Models | None) -> None:
+    def _update_order(self, pair: ImagePair, ideal: IdealPair) -> None:
         eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
         vergence_rad = math.nan if eyes is None else eyes.vergence_rad
-        focal_px = math.nan if models is None else models[0].fx_px
+        focal_px = math.nan if ideal.cameras is None else ideal.cameras[0].fx_px
         stamp_s = pair.left_stamp_ns * 1e-9
-        self._order.update(stamp_s, pair.left.pixels, pair.right.pixels, vergence_rad, focal_px)
+        self._order.update(stamp_s, ideal.left, ideal.right, vergence_rad, focal_px)
 
     def _publish_unusable(self, reason: str, header: Header, pair_skew_s: float) -> None:
         estimator = self._settings.get(DisparityParameters).estimator
@@ -125,7 +130,8 @@ class EdgeMetricNode(MetricNode):
                 # Its arrays are measured only now.
                 self._edge_publisher.publish(edge_message(edge, verged, header, pair_skew_s))
 
-    def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, models: Models | None) -> None:
+    def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, ideal: IdealPair) -> None:
+        models = ideal.cameras
         with self._times.measure("tracker"):
             now_ns = pair.left_stamp_ns
             eyes = self._joints.at(now_ns, pair.right_stamp_ns)
@@ -134,9 +140,10 @@ class EdgeMetricNode(MetricNode):
                 for stamp_ns, angles in self._joints.samples_between(now_ns - _JOINT_SAMPLES_NS, now_ns)
             ]
             why = "" if eyes is not None else self._joints.gap(max(now_ns, pair.right_stamp_ns))
-            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models, samples, why)
+            track = self._measurement.track(edge, now_ns * 1e-9, eyes, models and models[0], samples, why)
         angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
-        self._track_publisher.publish(track_message(track, edge, angular, pair.left.header, pair.skew_ns * 1e-9))
+        skew_s = pair.skew_ns * 1e-9
+        self._track_publisher.publish(track_message(track, edge, angular, ideal.eye_images, pair.left.header, skew_s))
 
     def _report_pictures(self) -> Report:
         fault = self._pictures.fault

@@ -49,7 +49,7 @@ class EyeRotationNode(MetricNode):
         )
         pairing = self._settings.get(PairingParameters)
         self._stereo = StereoInput(
-            self, root, pairing, diagnostics, qos, self._on_pair, self._selection.is_due, self._images
+            self, root, pairing, diagnostics, qos, self._on_pair, self._rig, self._selection.is_due, self._images
         )
         self._joint_input = self._subscribe_joints(diagnostics, qos)
         self._settings.on_change(self._on_settings)
@@ -70,7 +70,7 @@ class EyeRotationNode(MetricNode):
 
     def _measure(self, two: tuple[ImagePair, ImagePair]) -> None:
         before, pair = two
-        models = self._stereo.models_for(pair.left.pixels)
+        models = self._stereo.calibrated(pair)
         rest = self._settings.get(RestParameters)
         with self._times.measure("pair"):
             reading = measure_pair(self._encoder, rest, before, pair, self._joints, models)

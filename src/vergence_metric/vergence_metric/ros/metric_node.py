@@ -19,7 +19,7 @@ from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.stage_times import StageTimes
 from vergence_metric.ros.stereo_input import StereoInput
 from vergence_rig.joint_history import JointHistory
-from vergence_rig.rig import JOINT_NAMES
+from vergence_rig.rig import JOINT_NAMES, Rig
 
 _UNHEARD_S = 30.0  # without subscribers, until no images are received
 
@@ -33,12 +33,14 @@ def limit_threads(count: int) -> None:
 class MetricNode(Node):
     """Measures pairs on its own thread; without subscribers of its outputs it soon receives no images.
 
-    Subclasses must set `_worker` and `_stereo`, make their publishers by `_output`, and clear `_failure` after a
-    measured pair.
+    Subclasses must set `_rig`, `_worker` and `_stereo`, make their publishers by `_output`, and clear `_failure` after
+    a measured pair.
     """
 
     _worker: LatestWorker[Any]
     _stereo: StereoInput
+
+    _rig: Rig
 
     def __init__(self, name: str, images: LocalImages | None = None, **options: Any) -> None:
         super().__init__(name, **options)
@@ -83,7 +85,7 @@ class MetricNode(Node):
         return JointStateInput(self, diagnostics, qos, self._on_joints)
 
     def _on_joints(self, merged: MergedJoints) -> None:
-        self._joints.add(merged.stamp_ns, JOINT_NAMES, merged.angles_rad)
+        self._joints.add(merged.stamp_ns, JOINT_NAMES, self._rig.eye_angles(merged.angles_rad))
 
     def _on_failure(self, error: Exception) -> None:
         if not self.context.ok():

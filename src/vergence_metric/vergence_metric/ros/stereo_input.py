@@ -22,11 +22,15 @@ from vergence_common.images import ImageError, compressed_to_array, image_to_arr
 from vergence_common.local_images import LocalImages
 from vergence_common.qos import IMAGE_QOS, QosWatch
 from vergence_common.stamps import to_nanoseconds
+from vergence_metric.edges.edges import to_grey
+from vergence_metric.pairs.ideal_images import IdealImages, Models
 from vergence_metric.pairs.pairing import LEFT, RIGHT, Pair, StereoPairer
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.pairs.stage_times import StageTimes
 from vergence_metric.pairs.stream_health import StreamHealth
 from vergence_rig.camera import CameraModel, CameraModelError
+from vergence_rig.eye_image import EyeImage
+from vergence_rig.rig import Rig
 
 SIDES = ("left", "right")
 _SOURCES = (
@@ -50,6 +54,20 @@ ImagePair = Pair[ImageFrame]
 
 
 @dataclass(frozen=True, slots=True)
+class IdealPair:
+    """Both eyes' ideal images, and how they map to the images as they were taken; None without known cameras."""
+
+    left: npt.NDArray[np.uint8]
+    right: npt.NDArray[np.uint8]
+    eye_images: tuple[EyeImage, EyeImage] | None
+
+    @property
+    def cameras(self) -> Models | None:
+        """The ideal cameras."""
+        return self.eye_images and (self.eye_images[0].ideal, self.eye_images[1].ideal)
+
+
+@dataclass(frozen=True, slots=True)
 class _Undecoded:
     """One eye's image message and its time of arrival [ns, monotonic]."""
 
@@ -58,7 +76,7 @@ class _Undecoded:
 
 
 class StereoInput:
-    """Subscribes both eyes, passes each pair of images of equal size to `on_pair`, and adds diagnostics of the input.
+    """Subscribes both eyes, passes each pair of images to `on_pair`, and adds diagnostics of the input.
 
     `on_pair` runs in the executor's thread and should only hand the pair on. `models` holds the left and the right
     camera model by camera_info, None before the first. With `is_due`, only pairs for whose left stamp [ns] it is true
@@ -74,10 +92,14 @@ class StereoInput:
         diagnostics: Diagnostics,
         qos: QosWatch,
         on_pair: Callable[[ImagePair], None],
+        rig: Rig,
         is_due: Callable[[int], bool] | None = None,
         images: LocalImages | None = None,
     ) -> None:
         self.models: list[CameraModel | None] = [None, None]
+        self.eye_images: tuple[EyeImage, EyeImage] | None = None
+        """How the images of the newest pair map to ideal ones; None before the first, or without known cameras."""
+        self._ideal = IdealImages(rig)
         self.decode_times = StageTimes()
         self._node = node
         self._stereo, self._pairing = stereo, pairing
@@ -211,9 +233,10 @@ class StereoInput:
             self._deadline.reset()
         for pair in filter(None, map(self._decoded_pair, pairs)):
             left, right = pair.left.pixels.shape, pair.right.pixels.shape
-            if left[:2] != right[:2]:
+            if left[:2] != right[:2] and self.cameras_of(pair) is None:
                 self._size_mismatch = (
-                    f"left and right images must have one size: got {left[1]}x{left[0]} and {right[1]}x{right[0]}"
+                    "images of two cameras without calibration must have one size: "
+                    f"got {left[1]}x{left[0]} and {right[1]}x{right[0]}"
                 )
                 self._size_mismatches += 1
                 continue
@@ -231,16 +254,29 @@ class StereoInput:
         except CameraModelError as error:
             self.models[side] = None
             self._info_errors[side] = str(error)
+            self._node.get_logger().warning(f"{self._camera_fault(side)[1]}")
 
-    def models_for(self, pixels: npt.NDArray[np.uint8]) -> tuple[CameraModel, CameraModel] | None:
-        """Return both camera models if camera_info has described them for images of this size, else None."""
-        left, right = self.models[LEFT], self.models[RIGHT]
-        if left is None or right is None:
+    def cameras_of(self, pair: ImagePair) -> Models | None:
+        """Return both cameras of a pair, by camera_info or else by rig.yaml; None where neither has that image size."""
+        try:
+            return self._ideal.cameras((self.models[LEFT], self.models[RIGHT]), (pair.left.pixels, pair.right.pixels))
+        except ValueError:
             return None
-        size = (pixels.shape[1], pixels.shape[0])
-        if (left.width_px, left.height_px) != size or (right.width_px, right.height_px) != size:
-            return None
-        return left, right
+
+    def calibrated(self, pair: ImagePair) -> Models | None:
+        """Return both cameras of a pair if camera_info describes them for images of this size, else None."""
+        cameras, (left, right) = self.cameras_of(pair), self.models
+        return cameras if cameras is not None and cameras[0] is left and cameras[1] is right else None
+
+    def ideal(self, pair: ImagePair, grey: bool = False) -> IdealPair:
+        """Return a pair as ideal cameras would take it, or as it is where the cameras are not known."""
+        pictures = (pair.left.pixels, pair.right.pixels)
+        left, right = (to_grey(pixels) for pixels in pictures) if grey else pictures
+        cameras = self.cameras_of(pair)
+        if cameras is None:
+            return IdealPair(left, right, None)
+        self.eye_images = self._ideal.set_cameras(cameras)
+        return IdealPair(*self._ideal.draw(left, right), self.eye_images)
 
     def _stream_report(self, side: int) -> Report:
         health = self._health[side]
@@ -274,15 +310,19 @@ class StereoInput:
         return Report(OK, f"{counts.pairs} pairs", values)
 
     def _cameras_report(self) -> Report:
-        for side, name in enumerate(SIDES):
-            if self._info_errors[side] is not None:
-                return Report(ERROR, f"{name}/camera_info: {self._info_errors[side]}")
-        for side, name in enumerate(SIDES):
-            model, size = self.models[side], self._health[side].size_px
-            if model is None:
-                return Report(WARN, f"{name}/camera_info: no message yet; angles are NaN")
-            if size is not None and (model.width_px, model.height_px) != size:
-                got = f"{model.width_px}x{model.height_px}"
-                needed = f"{size[0]}x{size[1]}"
-                return Report(ERROR, f"{name}/camera_info must be for {needed} images: got {got}; angles are NaN")
-        return Report(OK, "camera_info received from both cameras")
+        faults = [self._camera_fault(side) for side in (LEFT, RIGHT)]
+        worst = max(faults, key=lambda one: one[0])
+        return Report(*worst) if worst[1] else Report(OK, "camera_info received from both cameras")
+
+    def _camera_fault(self, side: int) -> tuple[int, str]:
+        """Return level and text of what is wrong with a camera's description; OK and "" if nothing is."""
+        topic, model, size = f"{SIDES[side]}/camera_info", self.models[side], self._health[side].size_px
+        if model is not None and size in (None, (model.width_px, model.height_px)):
+            return OK, ""
+        if model is not None and size is not None:
+            level, fault = ERROR, f"must be for {size[0]}x{size[1]} images: got {model.width_px}x{model.height_px}"
+        else:
+            level, fault = WARN, self._info_errors[side] or "no message yet"
+        if size is not None and not self._ideal.describes(side == LEFT, *size):
+            return ERROR, f"{topic}: {fault}; rig.yaml describes another image shape too: angles are NaN"
+        return level, f"{topic}: {fault}; rig.yaml's description of the camera is used"

@@ -11,24 +11,37 @@ from vergence_metric.tracking.request import TrackRequest
 from vergence_metric.tracking.track import Track
 from vergence_msgs.msg import TargetTrack
 from vergence_msgs.msg import TrackRequest as TrackRequestMessage
+from vergence_rig.eye_image import EyeImage
+
+EyeImages = tuple[EyeImage, EyeImage]
 
 
 def track_message(
-    track: Track, result: EdgeMetricResult, angular: AngularDisparity | None, header: Header, pair_skew_s: float
+    track: Track,
+    result: EdgeMetricResult,
+    angular: AngularDisparity | None,
+    images: EyeImages | None,
+    header: Header,
+    pair_skew_s: float,
 ) -> TargetTrack:
-    """Return the track of a pair, in the images before alignment; `angular` is None without camera models."""
+    """Return the track of a pair, in the images as they were taken.
+
+    `angular` and `images` are None without camera models.
+    """
     height, width = result.left_grey.shape
-    right_x_px, right_y_px = result.alignment.unaligned(*track.right_px, width, height)
+    left_px, right_px = track.left_px, result.alignment.unaligned(*track.right_px, width, height)
+    if images is not None:
+        left_px, right_px = (_taken(image, px) for image, px in zip(images, (left_px, right_px), strict=True))
     return TargetTrack(
         header=header,
         pair_skew_s=pair_skew_s,
         goal_id=track.goal_id,
         track_id=track.track_id,
         lock_stamp=to_stamp(track.lock_stamp_s if math.isfinite(track.lock_stamp_s) else 0.0),
-        left_x_px=track.left_px[0],
-        left_y_px=track.left_px[1],
-        right_x_px=right_x_px,
-        right_y_px=right_y_px,
+        left_x_px=left_px[0],
+        left_y_px=left_px[1],
+        right_x_px=right_px[0],
+        right_y_px=right_px[1],
         disparity_px=track.disparity_px if angular is None else angular.horizontal_px,
         disparity_rad=math.nan if angular is None else angular.horizontal_rad,
         sigma_px=track.sigma_px,
@@ -66,13 +79,23 @@ def unusable_track_message(reason: str, header: Header, pair_skew_s: float) -> T
     )
 
 
-def track_request(message: TrackRequestMessage) -> TrackRequest:
-    """Return the request; its pixel is one of the raw image."""
+def track_request(message: TrackRequestMessage, images: EyeImages | None) -> TrackRequest:
+    """Return the request in pixels of the ideal image; of the one as it was taken without camera models."""
+    left, pixel = message.eye == TrackRequestMessage.EYE_LEFT, (message.x_px, message.y_px)
+    if images is not None:
+        x_px, y_px = images[0 if left else 1].to_ideal([pixel])[0]
+        pixel = (float(x_px), float(y_px))
     sized = message.width_px > 0.0 and message.height_px > 0.0
     return TrackRequest(
         goal_id=message.goal_id,
         stamp_s=to_seconds(message.header.stamp),
-        left_eye=message.eye == TrackRequestMessage.EYE_LEFT,
-        pixel=(message.x_px, message.y_px),
+        left_eye=left,
+        pixel=pixel,
         extent_px=(message.width_px, message.height_px) if sized else None,
     )
+
+
+def _taken(image: EyeImage, ideal_px: tuple[float, float]) -> tuple[float, float]:
+    """Return a pixel of an ideal image in the image as it was taken; NaN for NaN."""
+    x_px, y_px = image.to_camera([ideal_px])[0]
+    return float(x_px), float(y_px)

@@ -14,11 +14,15 @@ Pixel = tuple[float, float]
 
 @dataclass(frozen=True)
 class EyeView:
-    """One eye's camera at its joint angles; converts its pixels to directions in rig_base and back."""
+    """One eye's camera at its angles; converts its pixels to directions in rig_base and back.
+
+    `pitch_rad` is that of the camera on its pan axis, > 0 down.
+    """
 
     camera: CameraModel
     pan_rad: float
     tilt_rad: float
+    pitch_rad: float = 0.0
 
     def direction(self, pixel: Pixel) -> np.ndarray:
         """Return the unit direction (3,) in rig_base of a pixel."""
@@ -36,7 +40,7 @@ class EyeView:
 
     @cached_property
     def _rig_from_optical(self) -> np.ndarray:
-        return rotation_rig_from_optical(self.pan_rad, self.tilt_rad)
+        return rotation_rig_from_optical(self.pan_rad, self.tilt_rad, self.pitch_rad)
 
 
 def distance(a: Pixel, b: Pixel) -> float:

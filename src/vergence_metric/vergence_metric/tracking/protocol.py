@@ -13,7 +13,8 @@ from vergence_rig.geometry import EyeAngles
 class Tracker(Protocol):
     """Follows one target from pair to pair.
 
-    Built as `build(parameters, estimator, left_camera, right_camera, baseline_m)`, anew whenever one of these changes.
+    Built as `build(parameters, estimator, camera, kinematics)`, anew whenever one of these changes. `camera` is the
+    ideal one that took both eyes' images (see `vergence_rig.eye_image`).
     """
 
     def update(

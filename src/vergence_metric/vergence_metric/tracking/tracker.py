@@ -38,6 +38,7 @@ from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_metric.tracking.tracked_target import Target
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles
+from vergence_rig.kinematics import Kinematics
 
 _UNMISTAKABLE_SIMILARITY = 0.8
 _KEPT_SHARE = 0.9  # of a saccade: the largest distance from the fovea at which the target was not left
@@ -50,14 +51,13 @@ class TargetTracker:
         self,
         parameters: TrackerParameters,
         estimator: DisparityEstimator,
-        left_camera: CameraModel,
-        right_camera: CameraModel,
-        baseline_m: float,
+        camera: CameraModel,
+        kinematics: Kinematics,
     ) -> None:
         self._parameters = parameters
         self._estimator = estimator
-        self._segmenter = Segmenter(parameters, estimator, baseline_m)
-        self._cameras = (left_camera, right_camera)
+        self._segmenter = Segmenter(parameters, estimator, kinematics.baseline_m)
+        self._camera, self._pitch_rad = camera, kinematics.pitch_rad
         self._track_id = 0
         self.reset()
 
@@ -97,10 +97,11 @@ class TargetTracker:
         if stamp_s <= self._stamp_s:
             self.reset()
         motion = self._saccades.update(stamp_s, eyes, samples)
-        views = (
-            EyeView(self._cameras[0], eyes.pan_left_rad, eyes.tilt_rad),
-            EyeView(self._cameras[1], eyes.pan_right_rad, eyes.tilt_rad),
+        left_view, right_view = (
+            EyeView(self._camera, pan_rad, eyes.tilt_rad, self._pitch_rad)
+            for pan_rad in (eyes.pan_left_rad, eyes.pan_right_rad)
         )
+        views = (left_view, right_view)
         before, self._before, self._stamp_s = self._before, left, stamp_s
         if self._target is not None and self._target.patch is not None:
             return self._follow(self._target, left, right, stamp_s, views, motion.saccading)
@@ -126,7 +127,7 @@ class TargetTracker:
             return False
         p = self._parameters
         away_px = distance(track.left_px, _fovea(left))
-        saccade_px = self._cameras[0].fx_px * math.tan(p.saccade_rad)
+        saccade_px = self._camera.fx_px * math.tan(p.saccade_rad)
         if not self._wants_lock:
             self._distances.append((stamp_s, away_px))
             while self._distances[0][0] < stamp_s - p.saccade_s:

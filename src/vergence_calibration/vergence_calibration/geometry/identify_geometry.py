@@ -1,0 +1,262 @@
+"""A head's geometry found by looking: poses, features, one bundle adjustment, and whether its result can be used."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from vergence_calibration.eye_turn import Image
+from vergence_calibration.geometry.bundle import BundleAdjustment, Constraint, Solution
+from vergence_calibration.geometry.features import Features, features, matches, neighbours, tracks
+from vergence_calibration.geometry.poses import PoseParameters, planned_poses, visited
+from vergence_calibration.geometry.unknowns import NAMES, Prior, index, prior_of, rig_of
+from vergence_calibration.geometry.views import HeadViews, Observations, Poses
+from vergence_calibration.identification.axis_log import EYES, EyeCamera, IdentifyError
+from vergence_rig.camera import CameraModel
+from vergence_rig.rig import Rig
+
+Array = npt.NDArray[np.float64]
+
+_NEIGHBOURS = 10
+_LEAST_FEATURES, _LEAST_POINTS, _LEAST_SHARED = 80, 150, 60
+_LEAST_IN_VIEW, _LEAST_VIEWS_SHARE = 12, 0.7
+_AGREES, _LEAST_AGREEING = 0.2, 0.5
+_LEARNT = 0.7  # of the prior's standard deviation: what remains more uncertain was not seen
+_DEG = math.pi / 180.0
+_MOST_SIGMA = {
+    "lens_x_m": (0.004, 1e3, "mm"),
+    "lens_y_m": (0.004, 1e3, "mm"),
+    "roll_rad": (0.3 * _DEG, 1 / _DEG, "degrees"),
+    "pitch_rad": (0.3 * _DEG, 1 / _DEG, "degrees"),
+    "zero_rad": (0.4 * _DEG, 1 / _DEG, "degrees"),
+    "scale": (0.02, 1.0, ""),
+    "log_focal": (0.015, 100.0, "%"),
+    "cx_px": (8.0, 1.0, "px"),
+    "cy_px": (8.0, 1.0, "px"),
+}
+"""Largest standard deviation of what an eye needs, its factor and unit for a person."""
+_MAY_BE_UNSEEN = (
+    *(f"{eye}.{name}" for eye in EYES for name in ("k1", "k2")),
+    "lens_z_apart_m",
+    "tilt_scale",
+    "tilt_axis_x_m",
+    "tilt_axis_z_m",
+)
+
+
+@dataclass(frozen=True)
+class Look:
+    """One pose: reported joint angles (3,) as JOINT_NAMES, grey pictures by eye, sizes (w, h) of the whole images."""
+
+    joints_rad: Sequence[float]
+    pictures: Mapping[str, Image]
+    sizes_px: Mapping[str, tuple[int, int]]
+
+
+class LookingHead(Protocol):
+    """A head that turns to a pose and looks from there."""
+
+    def cameras(self) -> Mapping[str, EyeCamera]:
+        """Return the cameras by eye. Raises IdentifyError."""
+
+    def look(self, joints_rad: Mapping[str, float]) -> Look:
+        """Turn the joints, and return what both eyes see once they rest. Raises IdentifyError."""
+
+
+@dataclass(frozen=True)
+class FoundGeometry:
+    """The result; `values` and `sigmas` (G,) are of the NAMES, residuals are medians over all sightings.
+
+    `kept` names what the images did not show: it has the start's values. `cameras` are the start's, for whole images.
+    """
+
+    rig: Rig
+    cameras: Mapping[str, EyeCamera]
+    values: Array
+    sigmas: Array
+    kept: tuple[str, ...]
+    poses: int
+    points: int
+    residual_before_px: float
+    residual_px: float
+
+    def of(self, name: str, eye: str = "") -> tuple[float, float]:
+        """Return an unknown's value and standard deviation."""
+        place = index(name, eye)
+        return float(self.values[place]), float(self.sigmas[place])
+
+
+def identify_geometry(
+    head: LookingHead,
+    rig: Rig,
+    parameters: PoseParameters,
+    constraints: tuple[Constraint, ...] = (),
+    progress: Callable[[str], None] = lambda text: None,
+) -> FoundGeometry:
+    """Turn the head to many poses and return the geometry that explains what its eyes saw.
+
+    Args:
+        head: at rest, commanded by no other node, before things that do not move.
+        rig: the start; its limits hold.
+        parameters: of the poses.
+        constraints: what else is known, of stereo.yaml.
+        progress: called with every line of progress.
+
+    Raises:
+        IdentifyError: limits too close together, a scene with too little texture or depth, or one that moves.
+    """
+    planned = planned_poses(rig, parameters)
+    progress(f"geometry: looking from {len(planned)} poses")
+    cameras = head.cameras()
+    found: list[Features] = []
+    joints_rad = []
+    for number, pose in enumerate(planned):
+        look = head.look(pose)
+        if number == 0:
+            cameras = {eye: _sized(cameras[eye], look.sizes_px[eye], eye) for eye in EYES}
+        joints_rad.append([float(angle) for angle in look.joints_rad])
+        found += [features(look.pictures[eye]) for eye in EYES]
+        scales = [look.sizes_px[eye][0] / look.pictures[eye].shape[1] for eye in EYES]
+    _check_texture(found)
+    poses = visited(rig, joints_rad, joints_rad[0])
+    seen = _in_whole_images(_tracked(found, rig, cameras, poses), scales, cameras)
+    _check_sightings(seen, len(found))
+    progress(f"  {int(seen.point.max()) + 1} things found again from several poses, {len(seen.view)} sightings")
+    return solved(rig, cameras, poses, seen, constraints)
+
+
+def solved(
+    rig: Rig,
+    cameras: Mapping[str, EyeCamera],
+    poses: Poses,
+    seen: Observations,
+    constraints: tuple[Constraint, ...] = (),
+) -> FoundGeometry:
+    """Return the geometry that explains sightings, as `identify_geometry`. Raises IdentifyError."""
+    views = HeadViews(rig, cameras, poses)
+    prior = prior_of(rig, cameras)
+    before = BundleAdjustment(views, seen, prior, points_only=True)
+    before_px = float(np.median(before.solve(*before.start()).residuals_px))
+    adjustment = BundleAdjustment(views, seen, prior, constraints)
+    solution = adjustment.solve(*adjustment.start())
+    agreeing = float(np.mean(solution.weights > _AGREES))
+    if agreeing < _LEAST_AGREEING:
+        raise IdentifyError(
+            f"the head must explain {_LEAST_AGREEING:.0%} or more of what its eyes see: got {agreeing:.0%}; does "
+            "something move in view, or do the pans not carry the eyes that their names say?"
+        )
+    kept = _not_seen(prior, solution)
+    if kept:
+        held = replace(prior, sigmas=np.where(np.isin(NAMES, kept), 0.0, prior.sigmas))
+        adjustment = BundleAdjustment(views, seen, held, constraints)
+        solution = adjustment.solve(*adjustment.start())
+    sigmas = np.sqrt(np.diag(solution.covariance))
+    _check_certain(sigmas)
+    return FoundGeometry(
+        rig_of(rig, solution.vector[: len(NAMES)], cameras),
+        cameras,
+        solution.vector[: len(NAMES)],
+        sigmas,
+        kept,
+        len(poses.joints_rad),
+        int(seen.point.max()) + 1,
+        before_px,
+        float(np.median(solution.residuals_px)),
+    )
+
+
+def _tracked(found: Sequence[Features], rig: Rig, cameras: Mapping[str, EyeCamera], poses: Poses) -> Observations:
+    """Return the tracks through all views; those are matched that look in much the same direction by the start."""
+    views = HeadViews(rig, cameras, poses)
+    start = np.concatenate([prior_of(rig, cameras).means, np.zeros(views.size - len(NAMES))])
+    axes = views.view_poses(start).rotations[:, :, 2]
+    pairs = [(a, b, matches(found[a], found[b])) for a, b in neighbours(axes, _NEIGHBOURS)]
+    return tracks(found, pairs)
+
+
+def _in_whole_images(seen: Observations, scales: Sequence[float], cameras: Mapping[str, EyeCamera]) -> Observations:
+    """Return sightings in pixels of the whole images, without the lens distortion of calibrated cameras."""
+    pixels = (seen.pixels + 0.5) * np.asarray(scales)[seen.view % 2, None] - 0.5
+    for number, eye in enumerate(EYES):
+        if cameras[eye].calibrated:
+            mine, model = seen.view % 2 == number, cameras[eye].model
+            pixels[mine] = model.undistort(pixels[mine]) * (model.fx_px, model.fy_px) + (model.cx_px, model.cy_px)
+    known = np.isfinite(pixels).all(axis=1)
+    _, point = np.unique(seen.point[known], return_inverse=True)
+    return Observations(seen.view[known], point, pixels[known])
+
+
+def _sized(camera: EyeCamera, size_px: tuple[int, int], eye: str) -> EyeCamera:
+    """Return the camera for images of this size (w, h). Raises IdentifyError for a calibration of another shape."""
+    (width, height), model = size_px, camera.model
+    if (width, height) == (model.width_px, model.height_px):
+        return camera
+    grown = width / model.width_px
+    if camera.calibrated and abs(height / model.height_px / grown - 1.0) > 0.02:
+        raise IdentifyError(
+            f"no calibration for images of {width}x{height} px: camera_info of the {eye} camera is for "
+            f"{model.width_px}x{model.height_px} px; calibrate the camera in its running mode"
+        )
+    centre = ((model.cx_px + 0.5) * grown - 0.5, (model.cy_px + 0.5) * grown - 0.5)
+    if not camera.calibrated:
+        centre = (0.5 * (width - 1), 0.5 * (height - 1))
+    k = [model.fx_px * grown, 0.0, centre[0], 0.0, model.fy_px * grown, centre[1], 0.0, 0.0, 1.0]
+    distortion = [float(value) for value in model.distortion]
+    return replace(
+        camera, model=CameraModel.from_camera_info_values(width, height, k, distortion, model.distortion_model)
+    )
+
+
+def _not_seen(prior: Prior, solution: Solution) -> tuple[str, ...]:
+    sigmas = np.sqrt(np.diag(solution.covariance))
+    return tuple(
+        name
+        for name, sigma, known in zip(NAMES, sigmas, prior.sigmas, strict=True)
+        if name in _MAY_BE_UNSEEN and sigma > _LEARNT * known > 0
+    )
+
+
+def _check_texture(found: Sequence[Features]) -> None:
+    counts = np.array([len(features.pixels) for features in found])
+    if np.mean(counts >= _LEAST_FEATURES) < _LEAST_VIEWS_SHARE:
+        raise IdentifyError(
+            f"{_LEAST_VIEWS_SHARE:.0%} of the views must have {_LEAST_FEATURES} or more features for the geometry: "
+            f"got {int(np.median(counts))} in the median view; turn the head to things with texture, in good light"
+        )
+
+
+def _check_sightings(seen: Observations, views: int) -> None:
+    points = int(seen.point.max(initial=-1)) + 1
+    if points < _LEAST_POINTS:
+        raise IdentifyError(
+            f"{_LEAST_POINTS} or more things must be found again from several poses for the geometry: got {points}; "
+            "turn the head to things with texture that do not move"
+        )
+    enough = float(np.mean(np.bincount(seen.view, minlength=views) >= _LEAST_IN_VIEW))
+    if enough < _LEAST_VIEWS_SHARE:
+        raise IdentifyError(
+            f"{_LEAST_VIEWS_SHARE:.0%} of the views must show {_LEAST_IN_VIEW} or more things that other views show: "
+            f"got {enough:.0%}; turn the head so that things with texture are all around"
+        )
+    left, right = (np.bincount(seen.point[seen.view % 2 == number], minlength=points) > 0 for number in (0, 1))
+    shared = int(np.sum(left & right))
+    if shared < _LEAST_SHARED:
+        raise IdentifyError(
+            f"both eyes must see {_LEAST_SHARED} or more of the same things for the geometry: got {shared}; do both "
+            "look the same way, and is neither covered?"
+        )
+
+
+def _check_certain(sigmas: Array) -> None:
+    for eye in EYES:
+        for name, (most, factor, unit) in _MOST_SIGMA.items():
+            sigma = float(sigmas[index(name, eye)])
+            if not sigma <= most:
+                near = name in ("lens_x_m", "lens_y_m")
+                raise IdentifyError(
+                    f"{name} of the {eye} eye must be found to {factor * most:.2g} {unit}: got {factor * sigma:.2g}; "
+                    + ("turn the head to things at 0.3 to 2 m" if near else "turn the head to more texture all around")
+                )
