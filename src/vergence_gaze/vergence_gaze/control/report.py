@@ -61,7 +61,7 @@ class Command:
     track_request: TrackRequest | None = None
 
 
-_CLAIM_S = 0.8  # without results of images, after which eyes are no longer said to be verged
+_CLAIM_S = 0.6  # without results of images, after which eyes are no longer said to be verged
 
 
 def make_report(
