@@ -9,7 +9,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from bench.heads import simulated
+from bench.heads import joints_of
 from vergence_gaze.estimation.observations import EyeRotationObservation
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_metric.eye_rotation.encoder import EyeRotationReading as Reading
@@ -110,7 +110,7 @@ class RenderedRooms:
     """The encoder on what a camera in a rendered room sees; the room stays, `begin` places the target of a run."""
 
     def __init__(self, rig: Rig, parameters: SimParameters) -> None:
-        self._simulator = Simulator(parameters, rig, head=simulated(rig))
+        self._simulator = Simulator(parameters, rig)
         self._encoder = VisualEncoder(PARAMETERS, rig)
         self._models = [CameraModel(self._simulator.lenses[eye].camera) for eye in ("left", "right")]
         self.readings: list[Reading] = []
@@ -129,7 +129,8 @@ class RenderedRooms:
         """Return what is read of the head as it stands, None while it moves or has been read often enough."""
         if not self._rest.update(head) or self._rest.times > READINGS_PER_REST:
             return None
-        self._simulator.set_head(dict(zip(JOINT_NAMES, head.true_rad.tolist(), strict=True)))
+        real = self._simulator.head.real
+        self._simulator.set_head(joints_of(real, dict(zip(JOINT_NAMES, head.true_rad.tolist(), strict=True))))
         pair = self._simulator.capture()
         eyes = EyeAngles(*(head.reported_rad[name] for name in JOINT_NAMES))
         reading = self._encoder.measure(pair.left, pair.right, eyes, self._cameras)

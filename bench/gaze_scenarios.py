@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.gaze_runs import Encoder, Scenario
+from bench.heads import kinematics
 
 Array = npt.NDArray[np.float64]
 
-BASELINE_M = 0.065
 CROSSED_S = 2.5
 _HALF_FIELD_RAD = (math.atan(290.0 / 539.0), math.atan(210.0 / 539.0))
 
@@ -29,18 +29,13 @@ def still(point_m: Array) -> Callable[[float], Array]:
 
 
 def pans(point_m: Array) -> tuple[float, float, float]:
-    """Return pan_left, pan_right, tilt that fixate a point."""
-    x, y, z = point_m
-    forward = math.hypot(x, z)
-    return (
-        math.atan2(y - 0.5 * BASELINE_M, forward),
-        math.atan2(y + 0.5 * BASELINE_M, forward),
-        math.atan2(-z, x),
-    )
+    """Return pan_left, pan_right, tilt of the eyes that fixate a point."""
+    eyes = kinematics().gaze_for_point(point_m)
+    return eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad
 
 
 def in_view_start(point_m: Array, random: np.random.Generator) -> dict[str, float]:
-    """Return a random pose from which both eyes see the point."""
+    """Return a random pose of the eyes from which both see the point."""
     left, right, tilt = pans(point_m)
     while True:
         version, vergence = random.uniform(-0.6, 0.6), random.uniform(0.01, 0.25)
@@ -59,7 +54,7 @@ def in_view_start(point_m: Array, random: np.random.Generator) -> dict[str, floa
 
 
 def fixating(point_m: Array) -> dict[str, float]:
-    """Return the pose that fixates a point."""
+    """Return the pose of the eyes that fixates a point."""
     return dict(zip(("pan_left", "pan_right", "tilt"), pans(point_m), strict=True))
 
 
