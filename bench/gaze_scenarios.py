@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from bench.gaze_runs import Encoder, Scenario
 from bench.heads import kinematics
+from vergence_rig.kinematics import Kinematics
 
 Array = npt.NDArray[np.float64]
 
@@ -28,15 +29,15 @@ def still(point_m: Array) -> Callable[[float], Array]:
     return lambda time_s: point_m
 
 
-def pans(point_m: Array) -> tuple[float, float, float]:
-    """Return pan_left, pan_right, tilt of the eyes that fixate a point."""
-    eyes = kinematics().gaze_for_point(point_m)
+def pans(point_m: Array, head: Kinematics | None = None) -> tuple[float, float, float]:
+    """Return pan_left, pan_right, tilt of the eyes that fixate a point; of the default simulated head if none."""
+    eyes = (head or kinematics()).gaze_for_point(point_m)
     return eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad
 
 
-def in_view_start(point_m: Array, random: np.random.Generator) -> dict[str, float]:
-    """Return a random pose of the eyes from which both see the point."""
-    left, right, tilt = pans(point_m)
+def in_view_start(point_m: Array, random: np.random.Generator, head: Kinematics | None = None) -> dict[str, float]:
+    """Return a random pose of the eyes from which both see the point; of the default simulated head if none."""
+    left, right, tilt = pans(point_m, head)
     while True:
         version, vergence = random.uniform(-0.6, 0.6), random.uniform(0.01, 0.25)
         pose = {
