@@ -34,7 +34,7 @@ IDENTIFIED, FOUND, UNCALIBRATED, PRINCIPAL_POINT = "identified", "found", "uncal
 rig.yaml), or the description of a head with principal points far off."""
 
 NEAREST_M, FARTHEST_M = 0.3, 1.5
-CLICKS_OF_A_HEAD = 10
+HEADS = 10
 DURATION_S, REST_S = 4.0, 0.5
 ON_TARGET_DEG, FALSE_DEG, FALSE_VERGENCE_DEG = 0.35, 1.0, 0.5
 _PRINCIPAL_OFF_PX = 60.0
@@ -79,8 +79,9 @@ class GeometryOutcome:
 
 
 def trials(arm: str, count: int, ideal_servos: bool = False) -> list[GeometryTrial]:
-    """Return clicks, those of one head after one another."""
-    return [GeometryTrial(arm, ideal_servos, number // CLICKS_OF_A_HEAD, number) for number in range(count)]
+    """Return clicks over all heads, those of one head after one another."""
+    of_a_head = -(-count // HEADS)
+    return [GeometryTrial(arm, ideal_servos, number // of_a_head, number) for number in range(count)]
 
 
 def head_of(trial: GeometryTrial) -> Rig:

@@ -20,7 +20,9 @@ pytestmark = [pytest.mark.graph, pytest.mark.usefixtures("opengl")]
 @pytest.fixture
 def sim(graph: Any) -> SimNode:
     # Slow frames: many tests may share this machine.
-    node: SimNode = graph.start(SimNode, **{"camera.frame_rate_hz": 10.0, "right_camera.clock_offset_s": 0.02})
+    node: SimNode = graph.start(
+        SimNode, **{"head.model": "rolled", "camera.frame_rate_hz": 10.0, "right_camera.clock_offset_s": 0.02}
+    )
     return node
 
 
