@@ -17,9 +17,10 @@ _DISTORTION_OFF = np.array([0.01, 0.005, 5e-4, 5e-4, 0.0])
 def printed_head(seed: int) -> Rig:
     """Return a head with the default's baseline, image size and joint limits, all else a seeded amount off.
 
-    Lenses about 22 mm before their pan axes and up to 4 mm beside them, at heights up to 1.5 mm apart, the tilt axis about
-    45 mm below. Cameras rolled up to 2 degrees, pitched up to 2 degrees apart, yawed up to 3. Horn zeros up to 4 degrees off, joints turning 0.95
-    to 1.05 times what is commanded. Principal points up to 25 px off, focal lengths 1 to 3 % apart.
+    Lenses about 22 mm before their pan axes and up to 4 mm beside them, at heights up to 1.5 mm apart, the tilt axis
+    about 45 mm below. Cameras rolled up to 2 degrees, pitched up to 2 degrees apart, yawed up to 3. Horn zeros up to 4
+    degrees off, joints turning 0.95 to 1.05 times what is commanded. Principal points up to 25 px off, focal lengths 1
+    to 3 % apart.
     """
     random = np.random.default_rng([seed, 15])
 
