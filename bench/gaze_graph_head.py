@@ -10,7 +10,7 @@ import numpy.typing as npt
 from sensor_msgs.msg import JointState
 
 from bench.gaze_runs import Scenario, Trace, travel_s
-from bench.heads import simulated, write_rig
+from bench.heads import simulated
 from bench.results import OUT_DIR
 from vergence_bringup.demo.ros.recorder import Recorder, Stamped
 from vergence_bringup.demo.ros.stage import RoomStage, class_goal
@@ -21,6 +21,7 @@ from vergence_common.stamps import to_seconds
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence
 from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
+from vergence_rig.rig_file import write_rig
 
 Array = npt.NDArray[np.float64]
 Point = Sequence[float] | Array

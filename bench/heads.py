@@ -2,26 +2,16 @@
 
 from collections.abc import Mapping
 from functools import lru_cache
-from pathlib import Path
-
-import yaml
 
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
-from vergence_rig.rig_file import rig_as_mapping
 from vergence_sim.heads import HeadParameters, simulated_head
 
 
 def simulated(rig: Rig) -> Rig:
     """Return the default simulated head, with the servos and joint limits of `rig`."""
     return simulated_head(HeadParameters(), rig)
-
-
-def write_rig(path: Path, rig: Rig) -> None:
-    """Write a rig.yaml, for nodes in processes of their own."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(yaml.safe_dump(rig_as_mapping(rig), sort_keys=False), encoding="utf-8")
 
 
 @lru_cache(maxsize=1)
