@@ -1,10 +1,14 @@
 """Heads that are not as drawn: lenses off the axes, mounts turned, zeros and scales off, principal points anywhere.
 
 Ten printed heads, each in a room of its own, in the lockstep simulator: clicks on a cube or a pen at 0.3 to 1.5 m. The
-arms are what metric and controller are given. `identified`: the head's own description, or with
-VERGENCE_GEOMETRY_FOUND=FOLDER the rigs FOLDER/head_SEED.yaml; `uncalibrated`: the default rig.yaml and cameras without
-a calibration; `principal_point`: described heads whose principal points are up to 60 px off. `.ideal` rows are of ideal
-servos. VERGENCE_GEOMETRY_CLICKS sets the clicks of `identified` (100); the other arms have 0.4 of them.
+arms are what metric and controller are given:
+
+- `identified`: the head's own description, or with VERGENCE_GEOMETRY_FOUND=FOLDER the rigs FOLDER/head_SEED.yaml;
+- `uncalibrated`: the default rig.yaml, its pans' zeros unknown to 0.05 rad, and cameras without a calibration;
+- `principal_point`: the description of heads whose principal points are up to 60 px off.
+
+`.ideal` rows are of ideal servos. VERGENCE_GEOMETRY_CLICKS sets the clicks of `identified` (100); the other arms have
+0.4 of them.
 """
 
 import os

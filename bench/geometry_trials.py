@@ -37,6 +37,8 @@ NEAREST_M, FARTHEST_M = 0.3, 1.5
 HEADS = 10
 DURATION_S, REST_S = 4.0, 0.5
 ON_TARGET_DEG, FALSE_DEG, FALSE_VERGENCE_DEG = 0.35, 1.0, 0.5
+UNDESCRIBED_ZERO_SIGMA_RAD = 0.05
+"""Of a pan's zero and its camera's yaw together, before identify: evenly up to 4 and 3 degrees."""
 _PRINCIPAL_OFF_PX = 60.0
 _AZIMUTH_RAD, _ELEVATION_RAD = math.radians(25.0), math.radians(12.0)
 _IN_IMAGE_PX = 20.0
@@ -104,7 +106,8 @@ def _off_centre(camera: CameraSpec, random: np.random.Generator) -> CameraSpec:
 def rig_given(trial: GeometryTrial, head: Rig) -> Rig:
     """Return what the graph is given as rig.yaml."""
     if trial.arm == UNCALIBRATED:
-        return default_rig().with_servos(IDEAL) if trial.ideal_servos else default_rig()
+        undescribed = replace(default_rig(), zero_sigma_rad=UNDESCRIBED_ZERO_SIGMA_RAD)
+        return undescribed.with_servos(IDEAL) if trial.ideal_servos else undescribed
     if trial.arm == FOUND:
         found = found_rig(trial.head)
         return found.with_servos(IDEAL) if trial.ideal_servos else found
