@@ -5,7 +5,7 @@ Pairs are 640x480 with the simulator's noise, exposure and mounts, without lens 
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, from_version_vergence, gaze_for_point
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
+from vergence_sim.heads import rolled_head
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator, StereoFrame
 from vergence_sim.truth import TrueBox
@@ -31,7 +32,6 @@ ALIKE_SEEDS = range(980_000, 980_010)
 ALIKE_VIEWS = 100
 _SURFACE_RAYS = 24  # per side and eye; with the 6 of the live ground truth its own error would be 0.2 px
 _POINT_95 = 7.815  # of chi squared, three degrees of freedom
-_NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -101,8 +101,9 @@ def _cases(say: Callable[[str], None]) -> Iterator[Case]:
     for seed in WORLDS:
         rng = np.random.default_rng(seed)
         simulator = Simulator(
-            SimParameters.of({"world.seed": seed, "seed": seed, "servo": "ideal", "camera.distortion": _NO_DISTORTION}),
+            SimParameters.of({"world.seed": seed, "seed": seed, "servo": "ideal"}),
             rig,
+            head=replace(rolled_head(rig), left_camera=rig.left_camera, right_camera=rig.right_camera),
         )
         measurement = BoxMeasurement(BoxMetricParameters(), Kinematics(rig))
         for number in range(VIEWS):

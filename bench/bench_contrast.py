@@ -1,6 +1,7 @@
 """How well contrast separates vergence from clutter on held-out scenes, and how far windows agree."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 
 import cv2
@@ -25,6 +26,8 @@ from bench.results import Row
 from vergence_metric.alignment.parameters import AlignmentParameters
 from vergence_metric.edges.parameters import EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
+from vergence_rig.rig import EyeMount, default_rig
+from vergence_sim.heads import rolled_head
 from vergence_sim.parameters import SimParameters
 
 EDGES = EdgeParameters(windows_px=(50, 100))
@@ -143,15 +146,13 @@ def _rendered_pairs() -> tuple[list[EdgeMetricResult], list[EdgeMetricResult]]:
         {
             "camera.noise_sigma": HARD.noise_sigma,
             "right_camera.gain": HARD.gain,
-            "left_camera.roll_rad": 0.0,
-            "right_camera.roll_rad": HARD.roll_rad,
-            "right_camera.pitch_rad": 0.0,
         }
     )
+    head = replace(rolled_head(default_rig()), left_mount=EyeMount(), right_mount=EyeMount(roll_rad=HARD.roll_rad))
     errors = [0.0, *np.deg2rad([1.0, -1.2, 2.5, -3.0, 5.0])]
     verged: list[EdgeMetricResult] = []
     unverged: list[EdgeMetricResult] = []
-    for error_rad, frame in frames(hard, range(20, 23), 16, errors, seed=7):
+    for error_rad, frame in frames(hard, range(20, 23), 16, errors, seed=7, head=head):
         if frame.truth.target == "cube" and np.linalg.norm(frame.truth.target_point_m) < 0.6:
             result = EdgeMetric(EDGES, alignment=UNALIGNED).measure(frame.left, frame.right)
             (verged if error_rad == 0.0 else unverged).append(result)
@@ -190,7 +191,7 @@ def _window_spread(say: Callable[[str], None]) -> list[Row]:
     edges = EdgeParameters(windows_px=(100, 150, 200, 250, 300))
     plain: list[float] = []
     robust: list[float] = []
-    for _, frame in frames(SimParameters(), range(30, 33), 10, [0.0], seed=9):
+    for _, frame in frames(SimParameters.of({"head.model": "rolled"}), range(30, 33), 10, [0.0], seed=9):
         result = EdgeMetric(edges).measure(frame.left, frame.right)
         for figures, into in (
             (result.left_to_right_px, plain),

@@ -7,6 +7,7 @@ from contextlib import closing
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_rig.rig import Rig
 from vergence_sim.fixation import fixated_surface, look_at
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator, StereoFrame
@@ -27,12 +28,12 @@ def random_place(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def frames(
-    parameters: SimParameters, worlds: range, places: int, errors_rad: list[float], seed: int
+    parameters: SimParameters, worlds: range, places: int, errors_rad: list[float], seed: int, head: Rig | None = None
 ) -> Iterator[tuple[float, StereoFrame]]:
-    """Yield error and pair for `places` targets in each world, each seen with every error."""
+    """Yield error and pair for `places` targets in each world, each seen with every error; `head` as Simulator."""
     rng = np.random.default_rng(seed)
     for world in worlds:
-        with closing(Simulator(parameters.replaced({"world.seed": world, "seed": seed}))) as simulator:
+        with closing(Simulator(parameters.replaced({"world.seed": world, "seed": seed}), head=head)) as simulator:
             for i in range(places):
                 point = fixated_surface(simulator, TARGETS[i % len(TARGETS)], random_place(rng))
                 for error_rad in errors_rad:

@@ -51,7 +51,7 @@ def _glance(name: str, verged: bool, count: int, rig: Rig) -> Glance:
     eyes = pair.fixation(point)
     if not verged:
         eyes = EyeAngles(eyes.pan_left_rad, eyes.pan_left_rad, eyes.tilt_rad)
-    world = PhotoWorld(pair, SimParameters.of({"seed": 16}), rig)
+    world = PhotoWorld(pair, SimParameters.of({"seed": 16, "head.model": "rolled"}), rig)
     world.head.place(eyes.as_dict())
     return Glance(name, verged, eyes, [(world.view("left"), world.view("right")) for _ in range(count)])
 

@@ -45,10 +45,7 @@ def scenes(
                 "servo": "ideal",
                 "seed": world,
                 "world.seed": world,
-                "left_camera.roll_rad": 0.0,
-                "right_camera.roll_rad": 0.0,
-                "right_camera.pitch_rad": 0.0,
-                "camera.distortion": (0.0,) * 5,
+                "head.model": "ideal",
             }
         )
         simulator = Simulator(parameters)

@@ -9,6 +9,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from bench.heads import simulated
 from vergence_gaze.estimation.observations import EyeRotationObservation
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_metric.eye_rotation.encoder import EyeRotationReading as Reading
@@ -109,17 +110,9 @@ class RenderedRooms:
     """The encoder on what a camera in a rendered room sees; the room stays, `begin` places the target of a run."""
 
     def __init__(self, rig: Rig, parameters: SimParameters) -> None:
-        self._simulator = Simulator(parameters, rig)
+        self._simulator = Simulator(parameters, rig, head=simulated(rig))
         self._encoder = VisualEncoder(PARAMETERS, rig)
-        self._models = [
-            CameraModel.from_camera_info_values(
-                spec.width_px,
-                spec.height_px,
-                [spec.fx_px, 0, spec.cx_px, 0, spec.fy_px, spec.cy_px, 0, 0, 1],
-                list(parameters.camera.distortion),
-            )
-            for spec in (rig.left_camera, rig.right_camera)
-        ]
+        self._models = [CameraModel(self._simulator.lenses[eye].camera) for eye in ("left", "right")]
         self.readings: list[Reading] = []
         """Every reading since the start, accepted or not."""
         self.errors_rad: list[float] = []

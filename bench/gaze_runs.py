@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from bench.heads import described, simulated
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import BoxSighting, EyeRotationObservation, Observation
 from vergence_gaze.goals.goal import Goal, GoalKind
@@ -154,7 +155,8 @@ def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np
 @lru_cache(maxsize=1)
 def world() -> Simulator:
     """One world serves every run: only where its hinges are set matters, and that is set anew at every look."""
-    return Simulator(SimParameters(), default_rig(), render=False)
+    rig = default_rig()
+    return Simulator(SimParameters(), rig, render=False, head=simulated(rig))
 
 
 class SimulatedHead(FakeHead):
@@ -194,7 +196,7 @@ def run(
     realism = Realism() if realism is None else realism
     random = np.random.default_rng(scenario.seed + 7919)
     servo = SERVOS[setting.servo]
-    rig: Rig = default_rig().with_servos(servo)
+    rig: Rig = described(default_rig()).with_servos(servo)
     head = SimulatedHead(
         rig,
         scenario.target,

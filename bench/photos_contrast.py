@@ -45,7 +45,8 @@ def measured(names: list[str]) -> Contrasts:
     off: list[float] = []
     for name in names:
         pair, metric = pair_of(name), EdgeMetric()
-        world = PhotoWorld(pair, SimParameters.of({"seed": 1}), photographs_rig().with_servos(IDEAL))
+        parameters = SimParameters.of({"seed": 1, "head.model": "rolled"})
+        world = PhotoWorld(pair, parameters, photographs_rig().with_servos(IDEAL))
         for target in targets(name, CLICKS):
             for off_deg in (0.0, *OFF_DEG):
                 pose = pair.fixation(target.point).as_dict()

@@ -31,8 +31,7 @@ from vergence_metric.pairs.ideal_images import IdealImages
 from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_rig.camera import CameraModel
 from vergence_rig.joint_history import JointHistory
-from vergence_rig.rig import JOINT_NAMES, Rig
-from vergence_sim.optics import Lens
+from vergence_rig.rig import JOINT_NAMES, CameraSpec, Rig
 from vergence_sim.real_time import Schedule
 from vergence_sim.world import EYES, World
 
@@ -79,10 +78,11 @@ class Clickable(Protocol):
 class MetricOfPairs:
     """edge_metric_node's work on a pair, as the observations that gaze_controller_node makes of its messages."""
 
-    def __init__(self, rig: Rig, lenses: Mapping[str, Lens]) -> None:
+    def __init__(self, rig: Rig, calibrations: Mapping[str, CameraSpec | None]) -> None:
         self._rig = rig
         self._measurement = PairMeasurement(PairMeasurementParameters(), rig)
-        left, right = (_model(lenses[eye]) for eye in EYES)
+        # Without a calibration the nodes take rig.yaml's cameras.
+        left, right = (CameraModel(calibrations[eye] or rig.camera(eye == "left")) for eye in EYES)
         self._ideal = IdealImages(rig)
         self.images = self._ideal.set_cameras((left, right))
         """Both eyes' images, as their camera_info and the rig describe them."""
@@ -122,7 +122,7 @@ class Lockstep:
     def __init__(self, world: World, rig: Rig, parameters: GazeParameters | None = None) -> None:
         self.world = world
         self.controller = GazeController(rig, parameters or gaze_parameters(), CONTROL_PERIOD_S)
-        self.metric = MetricOfPairs(rig, world.lenses)
+        self.metric = MetricOfPairs(rig, world.calibrations)
         self.on_step: Callable[[Any], None] = lambda command: None
         self.newest_exposure_s = -math.inf
         """When the left image of the newest pair that was measured was exposed."""
@@ -229,12 +229,6 @@ def record(lockstep: Lockstep, point: Clickable, duration_s: float, rest_s: floa
     while world.time_s < began_s + duration_s - 1e-9 and world.time_s - began_s - verged_since_s < rest_s:
         lockstep.advance_to(world.time_s + CONTROL_PERIOD_S)
     return trace
-
-
-def _model(lens: Lens) -> CameraModel:
-    camera = lens.camera
-    matrix = [camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0]
-    return CameraModel.from_camera_info_values(camera.width_px, camera.height_px, matrix, lens.distortion)
 
 
 def clock_s(world_s: float) -> float:

@@ -1,21 +1,24 @@
 """One click on a photograph: where the eyes start, what plant turns them, and what came of it."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
 
-from bench.photos_data import Target, pair_of, photographs_rig
+from bench.heads import described, simulated
+from bench.photos_data import VIEW_PX, Target, pair_of, photographs_rig
 from bench.photos_lockstep import Lockstep, Trace, record
 from bench.photos_verdict import DURATION_S, REST_S, Verdict, verdict_of
-from vergence_rig.rig import JOINT_NAMES, Rig
+from vergence_rig.rig import JOINT_NAMES, Joints, Rig
 from vergence_rig.servo import IDEAL
+from vergence_sim.heads import ideal_head
 from vergence_sim.parameters import SimParameters
-from vergence_sim.photo.joints import Plant
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint
-from vergence_sim.photo.world import PhotoWorld
+from vergence_sim.photo.parameters import PlantParameters
+from vergence_sim.photo.world import PhotoWorld, cropped
 from vergence_sim.world import EYES
 
 AWAKE_S = 0.3
@@ -44,28 +47,42 @@ def ideal_rig() -> Rig:
     return photographs_rig().with_servos(IDEAL)
 
 
-PlantOf = Callable[[np.random.Generator, float, Rig], Plant]
-"""A plant from a seeded generator, the vergence that the target needs [rad] and the rig."""
+HeadOf = Callable[[Rig, np.random.Generator, float], Rig]
+"""The head that really turns, from the one that is described, a seeded generator and the vergence needed [rad]."""
 
 
-def _zero_off(random: np.random.Generator, vergence_rad: float, rig: Rig) -> Plant:
+def _zero_off(head: Rig, random: np.random.Generator, vergence_rad: float) -> Rig:
     """One joint's zero is 3 degrees off, to the other side where the limits would not let the eyes reach the target."""
     joint, zero = str(random.choice(JOINT_NAMES)), float(random.choice([-1.0, 1.0])) * _ZERO_RAD
     added = {"pan_left": -zero, "pan_right": zero, "tilt": 0.0}[joint]
-    reachable = vergence_rad - added > rig.minimum_vergence_rad + _SPARE_VERGENCE_RAD
-    return Plant(zero_rad={joint: zero if reachable else -zero})
+    reachable = vergence_rad - added > head.minimum_vergence_rad + _SPARE_VERGENCE_RAD
+    return _turning(head, {joint: zero if reachable else -zero})
 
 
-SETTINGS: dict[str, tuple[Callable[[], Rig], PlantOf]] = {
-    "sg90": (shipped_rig, lambda *_: Plant()),
-    "ideal": (ideal_rig, lambda *_: Plant()),
-    "mismatch.ideal": (shipped_rig, lambda *_: Plant(servo=IDEAL)),
-    "mismatch.deadband2x": (shipped_rig, lambda *_: Plant(dead_band_scale=2.0)),
-    "mismatch.slow": (shipped_rig, lambda *_: Plant(speed_scale=0.7)),
-    "mismatch.scale": (shipped_rig, lambda *_: Plant(angle_scale=1.06)),
+def _turning(head: Rig, zeros_rad: Mapping[str, float], scale: float = 1.0) -> Rig:
+    """Return a head whose joints' zeros are this much more, and whose scales are multiplied."""
+    joints = (
+        replace(joint, zero_rad=joint.zero_rad + zeros_rad.get(name, 0.0), scale=scale * joint.scale)
+        for name, joint in head.joints.items()
+    )
+    return replace(head, joints=Joints(*joints))
+
+
+def _fitted(**servos: Any) -> HeadOf:
+    plant = PlantParameters(**servos)
+    return lambda head, *_: plant.fitted(head)
+
+
+SETTINGS: dict[str, tuple[Callable[[], Rig], HeadOf]] = {
+    "sg90": (shipped_rig, _fitted()),
+    "ideal": (ideal_rig, _fitted()),
+    "mismatch.ideal": (shipped_rig, _fitted(servo="ideal")),
+    "mismatch.deadband2x": (shipped_rig, _fitted(dead_band_scale=2.0)),
+    "mismatch.slow": (shipped_rig, _fitted(speed_scale=0.7)),
+    "mismatch.scale": (shipped_rig, lambda head, *_: _turning(head, {}, 1.06)),
     "mismatch.zero": (shipped_rig, _zero_off),
 }
-"""By name: the rig that metric and controller are given, and the plant that really turns the eyes."""
+"""By name: the servos that metric and controller are given, and the head that really turns."""
 
 
 @dataclass(frozen=True)
@@ -87,18 +104,19 @@ def run(trial: Trial, make_lockstep: Callable[[PhotoWorld, Rig], Lockstep] = Loc
 def trace_of(trial: Trial, make_lockstep: Callable[[PhotoWorld, Rig], Lockstep] = Lockstep) -> tuple[Trace, Rig, float]:
     """Run a trial and return its trace, the rig that was described, and the share of padding in the view at the end."""
     cv2.setNumThreads(1)
-    described, plant_of = SETTINGS[trial.setting]
-    rig, pair, point = described(), pair_of(trial.target.pair), trial.target.point
+    base_of, head_of = SETTINGS[trial.setting]
+    base, pair, point = base_of(), pair_of(trial.target.pair), trial.target.point
     random = np.random.default_rng([trial.seed, 20])
-    fixation = pair.fixation(point)
-    plant = plant_of(random, fixation.vergence_rad, rig)
     values = {"seed": trial.seed}
     parameters = SimParameters.of(values) if trial.imperfect else SimParameters.ideal(values)
-    world = PhotoWorld(pair, parameters, rig, plant)
-    play = {name: plant.spec(joint.servo) for name, joint in rig.joints.items()}
+    ideal = parameters.head.model == "ideal"
+    rig = base if ideal else cropped(described(base), *VIEW_PX)
+    built = ideal_head(base) if ideal else cropped(simulated(base), *VIEW_PX)
+    head = head_of(built, random, pair.fixation(point).vergence_rad)
+    world = PhotoWorld(pair, parameters, rig, head)
     aside = {
-        name: float(random.uniform(-0.5, 0.5)) * (servo.dead_band_rad + servo.backlash_rad)
-        for name, servo in play.items()
+        name: float(random.uniform(-0.5, 0.5)) * (joint.servo.dead_band_rad + joint.servo.backlash_rad)
+        for name, joint in head.joints.items()
     }
     world.head.place(start_of(world, pair, point), 0.0, aside)
     lockstep = make_lockstep(world, rig)
@@ -124,10 +142,13 @@ class PointOfPhotograph:
 
 def start_of(world: PhotoWorld, pair: PhotoPair, point: PhotoPoint) -> dict[str, float]:
     """Return the pose, by joint name, from which the eyes begin."""
-    camera = world.rig.left_camera
-    # A zero that is off turns the eyes aside of what their driver reports.
-    margin_px = _IN_VIEW_PX + camera.fx_px * max(map(abs, world.head.plant.zero_rad.values()), default=0.0)
-    return pair.start_towards(point, camera, margin_px).as_dict()
+    head = world.head.real
+    # The image's middle need not be the eye's axis.
+    camera = head.left_camera
+    off_px = max(abs(camera.cx_px - 0.5 * (camera.width_px - 1)), abs(camera.cy_px - 0.5 * (camera.height_px - 1)))
+    eyes = pair.start_towards(point, camera, _IN_VIEW_PX + off_px, head.mean_pitch_rad)
+    joints = head.joint_angles((eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad))
+    return dict(zip(JOINT_NAMES, joints, strict=True))
 
 
 def outcome_of(trial: Trial, trace: Trace, rig: Rig, outside_share: float) -> Outcome:

@@ -57,10 +57,7 @@ class LockstepHead:
         """See Head."""
         cameras = {}
         for eye, lens in self.simulator.lenses.items():
-            c = lens.camera
-            k = [c.fx_px, 0.0, c.cx_px, 0.0, c.fy_px, c.cy_px, 0.0, 0.0, 1.0]
-            model = CameraModel.from_camera_info_values(c.width_px, c.height_px, k, [float(d) for d in lens.distortion])
-            cameras[eye] = EyeCamera(model, True)
+            cameras[eye] = EyeCamera(CameraModel(lens.camera), True)
         return cameras
 
     def record(self, joint: str, moves: Sequence[Move]) -> AxisLog:

@@ -88,7 +88,7 @@ def sweep(scene: Scene, windows_px: Sequence[int]) -> Sweep:
     metric = EdgeMetric(EdgeParameters(windows_px=tuple(windows_px)))
     rows: dict[str, list[Figures]] = {form: [] for form in (*FORMS, "chance")}
     foveal = []
-    with closing(Simulator(SimParameters.of({"world.seed": scene.world}))) as simulator:
+    with closing(Simulator(SimParameters.of({"world.seed": scene.world, "head.model": "rolled"}))) as simulator:
         point = fixated_surface(simulator, scene.target, np.array(scene.place_m))
         for error_deg in ERRORS_DEG:
             frame = look_at(simulator, point, math.radians(error_deg))

@@ -42,7 +42,7 @@ def _parameters(rng: np.random.Generator, seed: int) -> SimParameters:
             "world.seed": seed,
             "seed": seed,
             "servo": "ideal",
-            "camera.distortion": (0.0,) * 5 if rng.random() < 0.5 else SimParameters().camera.distortion,
+            "head.model": "ideal" if rng.random() < 0.5 else "rolled",
             "world.light": float(np.exp(rng.uniform(math.log(0.4), math.log(1.4)))),
             "world.samples_per_pixel": int(rng.choice([0, 0, 0, 4])),
             "world.look_alikes": int(rng.integers(0, 5)),

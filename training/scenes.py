@@ -1,5 +1,6 @@
 """Rooms of the simulator with several cubes, look-alikes and occluders, seen from anywhere: renders with true boxes."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from training.eye_renderer import EyeRenderer
 from training.labels import Label, label
 from training.webcam import webcam
 from vergence_rig.rig import default_rig
-from vergence_sim.scene import CUBE_SIDE_M
+from vergence_sim.scene import CUBE_SIDE_M, STAND
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -63,11 +64,12 @@ class Stage:
         builder.furniture()
         builder.targets()
         builder.populate(puzzle_share)
-        builder.head(2 * np.arctan(0.5 * HEIGHT_PX / _FOCAL_PX), {"left": (0.0, 0.0), "right": (0.0, 0.0)})
+        field_rad = 2 * math.atan(0.5 * HEIGHT_PX / _FOCAL_PX)
+        builder.head((field_rad, field_rad))
         self._model = builder.compile(WIDTH_PX, HEIGHT_PX, 1.0)
         self._smallest_px, self._puzzles = builder.smallest_px, builder.puzzles
         self._data = mujoco.MjData(self._model)
-        self._base = self._model.body("rig_base").pos.copy()
+        self._base = self._model.body(STAND).pos.copy()
         self._light = (
             self._model.vis.headlight.ambient.copy(),
             self._model.vis.headlight.diffuse.copy(),

@@ -17,6 +17,7 @@ from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_metric.ros.eye_rotation_node import EyeRotationNode
 from vergence_msgs.msg import EyeRotation
 from vergence_rig.rig import JOINT_NAMES, default_rig
+from vergence_sim.heads import rolled_head
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator, StereoFrame
 
@@ -26,13 +27,13 @@ MS = 1_000_000
 PERIOD_NS, SKEW_NS = 33 * MS, 5 * MS
 TRUE_RAD = {"pan_left": -0.025, "pan_right": 0.04, "tilt": 0.1}
 SAID_RAD = {"pan_left": -0.02, "pan_right": 0.037, "tilt": 0.1}
-SIMULATED = SimParameters()
+HEAD = rolled_head(default_rig())
 
 
 @pytest.fixture(scope="module")
 def seen() -> StereoFrame:
     """One pair of a room, and how the eyes stood."""
-    with closing(Simulator(SIMULATED, default_rig())) as simulator:
+    with closing(Simulator(SimParameters(), default_rig(), head=HEAD)) as simulator:
         simulator.set_head(TRUE_RAD)
         return simulator.capture()
 
@@ -63,7 +64,7 @@ class Head:
         for publisher in self.infos:
             publisher.publish(
                 CameraInfo(
-                    width=640, height=480, k=k, d=list(SIMULATED.camera.distortion), distortion_model="plumb_bob"
+                    width=640, height=480, k=k, d=list(HEAD.left_camera.distortion), distortion_model="plumb_bob"
                 )
             )
 
@@ -126,7 +127,7 @@ def test_the_true_vergence_is_read_although_the_joints_are_off(graph: Any, seen:
     assert message.vergence_rad == pytest.approx(true, abs=math.radians(0.12))
     assert abs(message.vergence_rad - true) < 4.0 * message.sigma_rad < math.radians(0.3)
     assert message.corrections_rad[0] == pytest.approx(message.vergence_rad - message.joint_vergence_rad)
-    assert message.corrections_rad[2] == pytest.approx(SIMULATED.right_camera.pitch_rad, abs=2e-3)
+    assert message.corrections_rad[2] == pytest.approx(HEAD.right_mount.pitch_rad, abs=2e-3)
     assert message.covariance_rad2[0] == pytest.approx(message.sigma_rad**2)
     assert message.header.frame_id == "left"
     assert to_nanoseconds(message.header.stamp) <= head.stamp_ns

@@ -68,7 +68,7 @@ def test_the_truth_follows_the_eyes_to_the_point(graph: Any, photo: PhotoNode) -
 
 
 def test_of_a_point_of_unknown_depth_the_left_eye_is_known(graph: Any, photographs: dict[str, str]) -> None:
-    values: dict[str, Any] = {"points_px": POINTS[:3], "rays_px": POINTS[3:5], "point": 1}
+    values: dict[str, Any] = {"points_px": POINTS[:3], "rays_px": POINTS[3:5], "point": 1, "head.model": "ideal"}
     graph.start(PhotoNode, **photographs, **values, **{"camera.frame_rate_hz": 10.0})
     truth = graph.wait(graph.message(TrueVergence, "ground_truth/vergence"))
     assert truth.target == "point 1"

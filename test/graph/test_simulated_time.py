@@ -33,7 +33,8 @@ class Blank:
     def __init__(self) -> None:
         self.parameters = SimParameters.of({"camera.frame_rate_hz": 20.0, "camera.frame_jitter_s": 0.0})
         self.time_s = 0.0
-        self.lenses = {eye: Lens(default_rig().left_camera, (0.0,) * 5) for eye in EYES}
+        self.lenses = {eye: Lens(default_rig().left_camera) for eye in EYES}
+        self.calibrations = {eye: default_rig().left_camera for eye in EYES}
         self.commands: list[tuple[float, float]] = []
 
     def set_parameters(self, parameters: SimParameters) -> None:

@@ -182,6 +182,12 @@ def fixation_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direction_b
     return Fixation(0.5 * (nearest_a + nearest_b), float(np.linalg.norm(nearest_b - nearest_a)))
 
 
+def angle_between(a: Any, b: Any) -> float:
+    """Return the angle between two directions (3,) of any length [rad], exact for small ones too."""
+    first, second = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    return math.atan2(float(np.linalg.norm(_cross(first, second))), float(first @ second))
+
+
 def check_converging(vergence_rad: float) -> None:
     """Raise ParallelAxesError or DivergingAxesError unless the axes of this vergence [rad] converge."""
     if not math.isfinite(vergence_rad):

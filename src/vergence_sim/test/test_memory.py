@@ -65,7 +65,7 @@ def resident_mb():
 
 def build(seeds):
     for seed in seeds:
-        build_scene(default_rig(), SimParameters(world=WorldParameters(seed=seed)), 0.8)
+        build_scene(default_rig(), SimParameters(world=WorldParameters(seed=seed)), (0.8, 0.8))
 
 build(range(101, 106))  # more than the cache holds
 before_mb = resident_mb()

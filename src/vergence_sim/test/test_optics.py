@@ -13,7 +13,7 @@ DISTORTION = (-0.04, 0.02, 0.0, 0.0, 0.0)
 
 
 def test_a_lens_without_distortion_changes_nothing():
-    lens = Lens(CameraSpec(), (0.0,) * 5)
+    lens = Lens(CameraSpec())
     view = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
     assert lens.apply(view) is view
     assert lens.render_focal_px == 539.0
@@ -22,7 +22,7 @@ def test_a_lens_without_distortion_changes_nothing():
 
 def test_a_rendered_point_lands_where_the_camera_model_says():
     camera = CameraSpec(distortion=DISTORTION)
-    lens = Lens(camera, DISTORTION)
+    lens = Lens(camera)
     ray = np.array([[0.4, -0.3, 1.0]])
     centre = np.array([319.5, 239.5])
     rendered = ray[0, :2] * lens.render_focal_px + centre
@@ -39,7 +39,7 @@ def test_a_rendered_point_lands_where_the_camera_model_says():
 
 
 def test_no_corner_is_left_without_a_view():
-    lens = Lens(CameraSpec(), DISTORTION)
+    lens = Lens(CameraSpec(distortion=DISTORTION))
     assert lens.apply(np.full((480, 640, 3), 200, np.uint8)).min() == 200
 
 

@@ -17,6 +17,9 @@ IDEAL = SimParameters.ideal({"world.seed": 2, "world.extra_cubes": 2, "world.loo
 SEEN = np.array([1, 1, 1, 0, 0, 0], np.uint8)
 
 
+FIELDS = (0.8, 0.8)
+
+
 @pytest.fixture(scope="module")
 def seeing():
     try:
@@ -28,7 +31,7 @@ def seeing():
 
 
 def test_an_untextured_room_is_furnished_alike():
-    grey, painted = (build_scene(default_rig(), IDEAL, 0.8, textured) for textured in (False, True))
+    grey, painted = (build_scene(default_rig(), IDEAL, FIELDS, textured) for textured in (False, True))
     assert grey.ntex == 0 < painted.ntex
     assert grey.ngeom == painted.ngeom
     for values in ("geom_pos", "geom_quat", "geom_size", "geom_type", "body_pos"):
@@ -36,15 +39,15 @@ def test_an_untextured_room_is_furnished_alike():
 
 
 def test_the_same_parameters_share_one_model():
-    assert build_scene(default_rig(), IDEAL, 0.8, False) is build_scene(default_rig(), IDEAL, 0.8, False)
-    other = build_scene(default_rig(), IDEAL.replaced({"world.seed": 3}), 0.8, False)
-    assert not np.array_equal(other.geom_pos[:40], build_scene(default_rig(), IDEAL, 0.8, False).geom_pos[:40])
+    assert build_scene(default_rig(), IDEAL, FIELDS, False) is build_scene(default_rig(), IDEAL, FIELDS, False)
+    other = build_scene(default_rig(), IDEAL.replaced({"world.seed": 3}), FIELDS, False)
+    assert not np.array_equal(other.geom_pos[:40], build_scene(default_rig(), IDEAL, FIELDS, False).geom_pos[:40])
 
 
 @pytest.mark.parametrize("world_seed", range(8))
 def test_nothing_stands_where_targets_go(world_seed):
     """From the head to two metres, 35 degrees to the sides and 20 up and down, every ray is free."""
-    model = build_scene(default_rig(), SimParameters.ideal({"world.seed": world_seed}), 0.8, textured=False)
+    model = build_scene(default_rig(), SimParameters.ideal({"world.seed": world_seed}), FIELDS, textured=False)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     head, geom = np.array([0.0, 0.0, HEAD_HEIGHT_M]), np.zeros(1, np.int32)

@@ -1,9 +1,8 @@
-"""Parameters of the simulated cameras: what both have in common, and how the right one differs."""
+"""Parameters of the simulated cameras: what both have in common, how the right one differs. Lenses are the head's."""
 
 from dataclasses import dataclass
 
-from vergence_rig.camera_limits import COEFFICIENTS
-from vergence_rig.parameters import ParameterError, Parameters, parameter
+from vergence_rig.parameters import Parameters, parameter
 
 
 @dataclass(frozen=True)
@@ -47,40 +46,11 @@ class CameraParameters(Parameters):
         maximum=100,
         formerly="jpeg_quality",
     )
-    distortion: tuple[float, ...] = parameter(
-        (-0.04, 0.02, 0.0, 0.0, 0.0),
-        "distortion coefficients of both lenses in OpenCV's order, k1 k2 p1 p2 k3 ...",
-        minimum=-1,
-        maximum=1,
-        read_only=True,
-        formerly="distortion",
-    )
-
-    def check(self) -> None:
-        """See Parameters."""
-        counts = COEFFICIENTS["plumb_bob"]
-        if len(self.distortion) not in counts:
-            raise ParameterError("distortion", self.distortion, f"a list of {', '.join(map(str, counts))} numbers")
-
-
-@dataclass(frozen=True)
-class LeftCameraParameters(Parameters):
-    """How the left camera is mounted."""
-
-    roll_rad: float = parameter(
-        -0.003,
-        "roll of the left camera in its mount",
-        unit="rad",
-        minimum=-0.2,
-        maximum=0.2,
-        read_only=True,
-        formerly="left_roll_rad",
-    )
 
 
 @dataclass(frozen=True)
 class RightCameraParameters(Parameters):
-    """How the right camera differs from the left one, and how it is mounted."""
+    """How the right camera differs from the left one."""
 
     clock_offset_s: float = parameter(
         0.007,
@@ -119,22 +89,4 @@ class RightCameraParameters(Parameters):
         minimum=0.1,
         maximum=4,
         formerly="right_red_gain",
-    )
-    roll_rad: float = parameter(
-        0.006,
-        "roll of the right camera in its mount",
-        unit="rad",
-        minimum=-0.2,
-        maximum=0.2,
-        read_only=True,
-        formerly="right_roll_rad",
-    )
-    pitch_rad: float = parameter(
-        0.0093,
-        "pitch of the right camera in its mount (the default shifts its image by about 5 px)",
-        unit="rad",
-        minimum=-0.2,
-        maximum=0.2,
-        read_only=True,
-        formerly="right_pitch_rad",
     )

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_rig.geometry import gaze_for_point
+from vergence_rig.kinematics import Kinematics
+from vergence_rig.rig import JOINT_NAMES
 from vergence_sim.simulator import Simulator, StereoFrame
 
 
@@ -18,12 +19,8 @@ def look_at(simulator: Simulator, point_m: NDArray[np.float64], vergence_error_r
 
     A positive error means that the eyes have to converge more, as in VergenceError.
     """
-    angles = gaze_for_point(point_m, simulator.rig.baseline_m)
-    simulator.set_head(
-        {
-            "pan_left": angles.pan_left_rad,
-            "pan_right": angles.pan_right_rad - vergence_error_rad,
-            "tilt": angles.tilt_rad,
-        }
-    )
+    real = simulator.head.real
+    eyes = Kinematics(real).gaze_for_point(point_m)
+    joints = real.joint_angles((eyes.pan_left_rad, eyes.pan_right_rad - vergence_error_rad, eyes.tilt_rad))
+    simulator.set_head(dict(zip(JOINT_NAMES, joints, strict=True)))
     return simulator.capture()

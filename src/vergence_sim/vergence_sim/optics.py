@@ -38,15 +38,15 @@ class Lens:
     `render_focal_px` is the focal length to render with, small enough that the view covers the corners of the image.
     """
 
-    def __init__(self, camera: CameraSpec, distortion: tuple[float, ...]) -> None:
-        self.camera, self.distortion = camera, distortion
-        self._distortion = np.array(distortion)
+    def __init__(self, camera: CameraSpec) -> None:
+        self.camera = camera
+        self._distortion = np.array(camera.distortion)
         self._matrix = np.array([[camera.fx_px, 0, camera.cx_px], [0, camera.fy_px, camera.cy_px], [0, 0, 1]])
         self.render_focal_px = camera.fx_px
         centre = np.array([(camera.width_px - 1) / 2, (camera.height_px - 1) / 2])
         centred = bool((centre == (camera.cx_px, camera.cy_px)).all()) and camera.fx_px == camera.fy_px
         self._maps: tuple[Any, Any] | None = None
-        if not any(distortion) and centred:
+        if not any(camera.distortion) and centred:
             return
         x, y = np.meshgrid(np.arange(camera.width_px, dtype=np.float64), np.arange(camera.height_px, dtype=np.float64))
         pixels = np.stack([x.ravel(), y.ravel()], axis=1)[:, None, :]

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError, parameter
-from vergence_sim.camera_parameters import CameraParameters, LeftCameraParameters, RightCameraParameters
+from vergence_sim.camera_parameters import CameraParameters, RightCameraParameters
 from vergence_sim.clock_parameters import ClockParameters
+from vergence_sim.heads import HeadParameters
 
 TARGETS = ("cube", "marker", "straw", "cable", "stick")
 DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
@@ -22,13 +23,13 @@ class SimulationParameters(Parameters):
     rig: str = parameter("", "path of rig.yaml; empty for the built-in rig", read_only=True)
     preset: str = parameter(
         "realistic",
-        "imperfections of servos and cameras: as the other parameters say (realistic), or none at all (ideal)",
+        "imperfections of head, servos and cameras: as the other parameters say (realistic), or none at all (ideal)",
         choices=("realistic", "ideal"),
         read_only=True,
     )
     servo: str = parameter(
         "rig",
-        "servos that turn the head: those of rig.yaml (rig), or all of one kind",
+        "servos that turn the head: its own, those of rig.yaml for a built-in head (rig), or all of one kind",
         choices=("rig", "sg90", "mg995", "ideal"),
         read_only=True,
     )
@@ -208,9 +209,9 @@ class MotionParameters(Parameters):
 
 GROUPS: Groups = (
     ("", SimulationParameters),
+    ("head.", HeadParameters),
     ("world.", WorldParameters),
     ("camera.", CameraParameters),
-    ("left_camera.", LeftCameraParameters),
     ("right_camera.", RightCameraParameters),
     ("target.", TargetParameters),
     ("motion.", MotionParameters),
@@ -221,19 +222,16 @@ NODE_GROUPS: Groups = (*GROUPS, ("clock.", ClockParameters))
 
 _IDEAL: Mapping[str, Any] = {
     "servo": "ideal",
+    "head.model": "ideal",
     "camera.frame_jitter_s": 0.0,
     "camera.exposure_s": 0.0,
     "camera.noise_sigma": 0.0,
     "camera.jpeg_quality": 0,
-    "camera.distortion": (0.0, 0.0, 0.0, 0.0, 0.0),
-    "left_camera.roll_rad": 0.0,
     "right_camera.clock_offset_s": 0.0,
     "right_camera.clock_drift": 0.0,
     "right_camera.gain": 1.0,
     "right_camera.blue_gain": 1.0,
     "right_camera.red_gain": 1.0,
-    "right_camera.roll_rad": 0.0,
-    "right_camera.pitch_rad": 0.0,
 }
 
 
@@ -242,9 +240,9 @@ class SimParameters:
     """Every parameter group of the simulator, in the order of GROUPS. The defaults equal config/sim_node.yaml."""
 
     simulation: SimulationParameters = field(default_factory=SimulationParameters)
+    head: HeadParameters = field(default_factory=HeadParameters)
     world: WorldParameters = field(default_factory=WorldParameters)
     camera: CameraParameters = field(default_factory=CameraParameters)
-    left_camera: LeftCameraParameters = field(default_factory=LeftCameraParameters)
     right_camera: RightCameraParameters = field(default_factory=RightCameraParameters)
     target: TargetParameters = field(default_factory=TargetParameters)
     motion: MotionParameters = field(default_factory=MotionParameters)

@@ -1,6 +1,7 @@
 """Offscreen rendering of both eyes with MuJoCo, on EGL or OSMesa."""
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import cv2
@@ -16,9 +17,10 @@ class RenderError(RuntimeError):
 
 
 class EyeRenderer:
-    """Renders a named camera of a model as (h, w, 3) BGR uint8."""
+    """Renders named cameras of a model as (h, w, 3) BGR uint8, each in its own size, `sizes_px` (width, height)."""
 
-    def __init__(self, model: Any, width_px: int, height_px: int) -> None:
+    def __init__(self, model: Any, sizes_px: Mapping[str, tuple[int, int]]) -> None:
+        width_px, height_px = (max(sides) for sides in zip(*sizes_px.values(), strict=True))
         self._context: Any = None
         try:
             self._context = mujoco.GLContext(width_px, height_px)
@@ -40,8 +42,10 @@ class EyeRenderer:
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
         self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZERONEAR
-        self._viewport = mujoco.MjrRect(0, 0, width_px, height_px)
-        self._rgb = np.empty((height_px, width_px, 3), np.uint8)
+        self._viewports = {camera: mujoco.MjrRect(0, 0, *size) for camera, size in sizes_px.items()}
+        self._pictures = {
+            camera: np.empty((height, width, 3), np.uint8) for camera, (width, height) in sizes_px.items()
+        }
 
     def render(self, data: Any, camera: str) -> Image:
         """Return the view of a camera."""
@@ -50,10 +54,11 @@ class EyeRenderer:
         mujoco.mjv_updateScene(
             self._model, data, self._options, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
         )
-        mujoco.mjr_render(self._viewport, self._scene, self._mjr)
-        mujoco.mjr_readPixels(self._rgb, None, self._viewport, self._mjr)
+        viewport, rgb = self._viewports[camera], self._pictures[camera]
+        mujoco.mjr_render(viewport, self._scene, self._mjr)
+        mujoco.mjr_readPixels(rgb, None, viewport, self._mjr)
         # OpenGL's rows run upwards and its channels are RGB.
-        return np.asarray(cv2.cvtColor(cv2.flip(self._rgb, 0), cv2.COLOR_RGB2BGR), np.uint8)
+        return np.asarray(cv2.cvtColor(cv2.flip(rgb, 0), cv2.COLOR_RGB2BGR), np.uint8)
 
     def close(self) -> None:
         """Free the context and its buffers; idempotent."""

@@ -1,12 +1,13 @@
 """The world as a MuJoCo model: a furnished room, the head on its pedestal, movable targets and an occluder."""
 
 import functools
-import math
 from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
+from vergence_rig.head_bodies import BASE, CAMERAS, EYES
+from vergence_rig.head_mjcf import camera_mjcf, mjcf_bodies
 from vergence_rig.rig import Rig
 from vergence_sim.memory import return_free_memory
 from vergence_sim.model_builder import HIDDEN_GROUP, ModelBuilder
@@ -14,8 +15,11 @@ from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.pictures import book_cover, cube_faces, look_alike_faces
 from vergence_sim.room import Room
 from vergence_sim.surfaces import Image, cloth, shaded, wood
+from vergence_sim.true_gaze import fovea_sites
 
 HEAD_HEIGHT_M = 1.15
+STAND = "stand"
+"""The body that carries rig_base, and does not turn with it."""
 CUBE_SIDE_M = 0.057
 MARKER_LENGTH_M, MARKER_RADIUS_M = 0.14, 0.010
 THIN_LENGTH_M = 0.24
@@ -129,42 +133,19 @@ class SceneBuilder(ModelBuilder):
             turn = (0.0, 0.0, float(rng.uniform(-0.7, 0.7)))
             self.add(self.shape("box", (x, y, z + side), (side, side, side), faces, turn, name))
 
-    def head(self, fovy_rad: float, mounts: dict[str, tuple[float, float]]) -> None:
-        """The paper's second hardware design: two pans on top of a tilt bar, a camera on each, on a turning base.
+    def head(self, fovy_rad: tuple[float, float]) -> None:
+        """The rig's head on a post: two pans on top of a tilt bar, a camera on each, all on a base that turns.
 
-        `mounts` gives each eye's roll and pitch in its mount [rad]. The head's own parts are in HIDDEN_GROUP.
+        The head's own parts are in HIDDEN_GROUP.
         """
-        half = self._rig.baseline_m / 2
-        dark, blue, steel = (0.09, 0.09, 0.1), (0.1, 0.2, 0.5), (0.6, 0.62, 0.64)
-        housing = self._hidden("box", (-0.02, 0, 0), (0.018, 0.022, 0.016), dark)
-        lens = self._hidden("cylinder", (-0.001, 0, 0), (0.008, 0.004), steel, (0, math.pi / 2, 0))
-        servo = self._hidden("box", (0, 0, -0.032), (0.006, 0.0115, 0.013), blue)
-        eyes = "".join(
-            f'<body name="{eye}_camera" pos="0 {sign * half} 0">'
-            f'<joint name="pan_{eye}" type="hinge" axis="0 0 1"/>'
-            '<inertial pos="0 0 0" mass="0.05" diaginertia="1e-4 1e-4 1e-4"/>'
-            # Roll and pitch of the mount.
-            f'<body name="{eye}_lens" euler="{mounts[eye][0]} {mounts[eye][1]} 0">'
-            '<inertial pos="0 0 0" mass="0.01" diaginertia="1e-5 1e-5 1e-5"/>'
-            f'<camera name="{eye}" xyaxes="0 -1 0 0 0 1" fovy="{math.degrees(fovy_rad):.9f}"/>'
-            f"{_named(housing + lens, eye)}</body></body>"
-            for eye, sign in (("left", 1), ("right", -1))
-        )
-        bar = self._hidden("box", (0, 0, -0.05), (0.012, half + 0.03, 0.004), steel)
-        servos = "".join(
-            servo.replace('pos="0.00000 0.00000', f'pos="0.00000 {sign * half:.5f}').replace(
-                'name="', f'name="{eye}_servo_'
-            )
-            for eye, sign in (("left", 1), ("right", -1))
-        )
-        height = HEAD_HEIGHT_M - 0.054
-        post = self._hidden("cylinder", (0, 0, -0.054 - height / 2), (0.015, height / 2), steel)
-        self.add(
-            f'<body name="rig_base" pos="0 0 {HEAD_HEIGHT_M}"><joint name="yaw" type="hinge" axis="0 0 1"/>'
-            f'<inertial pos="0 0 0" mass="1" diaginertia="1e-2 1e-2 1e-2"/>{post}'
-            '<body name="tilt_bar"><joint name="tilt" type="hinge" axis="0 1 0"/>'
-            f'<inertial pos="0 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/>{bar}{servos}{eyes}</body></body>'
-        )
+        below = 0.09 - min(self._rig.tilt_axis_z_m, 0.0)
+        height = HEAD_HEIGHT_M - below
+        steel = (0.6, 0.62, 0.64)
+        post = self.shape("cylinder", (0, 0, -below - height / 2), (0.015, height / 2), steel, group=HIDDEN_GROUP)
+        inside = {BASE: '<joint name="yaw" type="hinge" axis="0 0 1"/>' + post} | fovea_sites(self._rig)
+        inside |= {CAMERAS[eye]: camera_mjcf(eye, self._rig, fovy) for eye, fovy in zip(EYES, fovy_rad, strict=True)}
+        bodies = mjcf_bodies(self._rig, inside, HIDDEN_GROUP)
+        self.add(f'<body name="{STAND}" pos="0 0 {HEAD_HEIGHT_M}">{bodies}</body>')
 
     def compile(self, width_px: int, height_px: int, light: float) -> mujoco.MjModel:
         """Return the compiled model, lit by a ceiling lamp, a window's light and light from everywhere."""
@@ -185,20 +166,6 @@ class SceneBuilder(ModelBuilder):
 
     def _wrapped(self, name: str, images: list[Image]) -> str:
         return self.wrap(name, images) if self.textured else name
-
-    def _hidden(
-        self,
-        kind: str,
-        centre: tuple[float, float, float],
-        size: tuple[float, ...],
-        colour: tuple[float, float, float],
-        turn: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    ) -> str:
-        return self.shape(kind, centre, size, colour, turn, group=HIDDEN_GROUP)
-
-
-def _named(shapes: str, eye: str) -> str:
-    return shapes.replace('name="', f'name="{eye}_')
 
 
 def _colour(rng: np.random.Generator, darkest: float, lightest: float) -> tuple[float, float, float]:
@@ -222,8 +189,7 @@ def _compiled(
     seed: int,
     samples: int,
     light: float,
-    fovy_rad: float,
-    mounts: tuple[tuple[float, float], ...],
+    fovy_rad: tuple[float, float],
     extra_cubes: int,
     look_alikes: int,
     distractor: str,
@@ -237,26 +203,28 @@ def _compiled(
     builder.crowd(extra_cubes, look_alikes)
     builder.furniture()
     builder.room()
-    builder.head(fovy_rad, dict(zip(("left", "right"), mounts, strict=True)))
-    model = builder.compile(rig.left_camera.width_px, rig.left_camera.height_px, light)
+    builder.head(fovy_rad)
+    cameras = (rig.left_camera, rig.right_camera)
+    width_px, height_px = max(c.width_px for c in cameras), max(c.height_px for c in cameras)
+    model = builder.compile(width_px, height_px, light)
     return_free_memory()
     return model
 
 
-def build_scene(rig: Rig, parameters: SimParameters, fovy_rad: float, textured: bool = True) -> mujoco.MjModel:
-    """Return the compiled room with head and targets; `fovy_rad` is the rendered views' vertical field of view.
+def build_scene(
+    head: Rig, parameters: SimParameters, fovy_rad: tuple[float, float], textured: bool = True
+) -> mujoco.MjModel:
+    """Return the compiled room with head and targets; `fovy_rad` is each rendered view's vertical field of view.
 
     The model is cached and shared between equal parameters: do not change it.
     """
-    world, right = parameters.world, parameters.right_camera
-    mounts = ((parameters.left_camera.roll_rad, 0.0), (right.roll_rad, right.pitch_rad))
+    world = parameters.world
     return _compiled(
-        rig,
+        head,
         world.seed,
-        parameters.world.samples_per_pixel,
+        world.samples_per_pixel,
         world.light,
         fovy_rad,
-        mounts,
         world.extra_cubes,
         world.look_alikes,
         world.distractor,

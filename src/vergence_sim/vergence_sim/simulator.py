@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.rig import Rig, default_rig
-from vergence_sim.head import Head
+from vergence_sim.head import Head, with_chosen_servos
+from vergence_sim.heads import published_cameras, simulated_head
 from vergence_sim.memory import return_free_memory
 from vergence_sim.motion import offset_m
 from vergence_sim.optics import Lens, Sensor, motion_blurred
 from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.renderer import EyeRenderer
-from vergence_sim.scene import OBJECTS, build_scene
+from vergence_sim.scene import OBJECTS, STAND, build_scene
 from vergence_sim.truth import GroundTruth, TrueBox, Truth
 
 Array = npt.NDArray[np.float64]
@@ -44,28 +45,40 @@ class Simulator:
     render images.
     """
 
-    def __init__(self, parameters: SimParameters | None = None, rig: Rig | None = None, render: bool = True) -> None:
+    def __init__(
+        self,
+        parameters: SimParameters | None = None,
+        rig: Rig | None = None,
+        render: bool = True,
+        head: Rig | None = None,
+    ) -> None:
+        """Make the head and its room.
+
+        Args:
+            parameters: of the simulation.
+            rig: that a driver and the other nodes are given; the built-in one if none.
+            render: False for no images.
+            head: the head that is simulated, as a rig of its own; the parameters' if none.
+        """
         self.parameters = (parameters or SimParameters()).effective()
-        self.rig = rig or default_rig()
-        self.head = Head(self.rig, self.parameters)
+        simulation, self.rig = self.parameters.simulation, rig or default_rig()
+        built = simulated_head(self.parameters.head, self.rig) if head is None else head
+        self.head = Head(with_chosen_servos(self.rig, simulation), with_chosen_servos(built, simulation))
         self.time_s = 0.0
-        cameras = {"left": self.rig.left_camera, "right": self.rig.right_camera}
-        self.lenses = {eye: Lens(camera, self.parameters.camera.distortion) for eye, camera in cameras.items()}
-        focal_px = min(lens.render_focal_px for lens in self.lenses.values())
-        if len({lens.render_focal_px for lens in self.lenses.values()}) > 1:
-            raise ValueError(
-                "left_camera and right_camera of the rig must have one focal length: the simulator renders both alike"
-            )
-        height, width = self.rig.left_camera.height_px, self.rig.left_camera.width_px
-        self._model = build_scene(self.rig, self.parameters, 2 * math.atan(0.5 * height / focal_px), textured=render)
+        cameras = {"left": built.left_camera, "right": built.right_camera}
+        self.lenses = {eye: Lens(camera) for eye, camera in cameras.items()}
+        self.calibrations = published_cameras(self.parameters.head.camera_info, self.rig, built)
+        fields = [2 * math.atan(0.5 * lens.camera.height_px / lens.render_focal_px) for lens in self.lenses.values()]
+        self._model = build_scene(built, self.parameters, (fields[0], fields[1]), textured=render)
         self._data = mujoco.MjData(self._model)
-        self._truth = GroundTruth(self._model, self._data, self.lenses)
-        self._renderer = EyeRenderer(self._model, width, height) if render else None
-        seeds = np.random.SeedSequence(self.parameters.simulation.seed).spawn(2)
+        self._truth = GroundTruth(self._model, self._data, self.lenses, built)
+        sizes_px = {eye: (camera.width_px, camera.height_px) for eye, camera in cameras.items()}
+        self._renderer = EyeRenderer(self._model, sizes_px) if render else None
+        seeds = np.random.SeedSequence(simulation.seed).spawn(2)
         self._sensors = (
             {
                 eye: Sensor(np.random.default_rng(seed), (height, width), eye == "right")
-                for eye, seed in zip(("left", "right"), seeds, strict=True)
+                for (eye, (width, height)), seed in zip(sizes_px.items(), seeds, strict=True)
             }
             if render
             else {}
@@ -182,7 +195,7 @@ class Simulator:
 
     def truth(self) -> Truth:
         """Return the ground truth about the target now."""
-        return self._truth.evaluate(self.parameters.target.object, self.head.true_rad)
+        return self._truth.evaluate(self.parameters.target.object)
 
     def mean_disparity_px(self, grid: int) -> float:
         """Return the mean disparity [px] of the target's surface that both eyes see, from grid x grid rays per eye."""
@@ -196,6 +209,11 @@ class Simulator:
         """Return the errors (vergence, version, tilt) to a point in rig_base (3,) [m], in radians."""
         return self._truth.axis_errors(self._in_world(np.asarray(point_m, np.float64)))
 
+    def angles_to_foveas(self, point_m: Sequence[float] | Array) -> tuple[float, float]:
+        """Return the angles between a point in rig_base (3,) [m] and the left and the right optical axis [rad]."""
+        point = self._in_world(np.asarray(point_m, np.float64))
+        return self._truth.angle_to_fovea("left", point), self._truth.angle_to_fovea("right", point)
+
     def true_boxes(self, eye: str) -> list[TrueBox]:
         """Return the true boxes of the targets and extra cubes in one eye's image, lens distortion included."""
         boxes = (self._truth.box(eye, name) for name in self._truth.objects)
@@ -206,7 +224,7 @@ class Simulator:
         return self.head.modelled_rad
 
     def true_joints(self) -> dict[str, float]:
-        """Return the true angles of the shafts [rad]."""
+        """Return the true angles of the shafts, as joints [rad]."""
         return self.head.true_rad
 
     def close(self) -> None:
@@ -217,7 +235,7 @@ class Simulator:
             return_free_memory()
 
     def _motion_px(self, eye: str) -> tuple[float, float]:
-        rates = self.head.velocity_rad_s
+        rates = self.head.axis_speeds_rad_s
         focal_px, exposure_s = self.lenses[eye].camera.fx_px, self.parameters.camera.exposure_s
         sideways = rates[f"pan_{eye}"] + self.parameters.simulation.rig_yaw_rate_rad_s
         return focal_px * sideways * exposure_s, focal_px * rates["tilt"] * exposure_s
@@ -226,9 +244,9 @@ class Simulator:
         self._places[name] = np.array([0.0, 0.3 * TARGETS.index(name), -5.0])  # below the floor
 
     def _update(self) -> None:
-        data, joints = self._data, self.head.true_rad
-        for name in ("pan_left", "pan_right", "tilt"):
-            data.joint(name).qpos[0] = joints[name]
+        data = self._data
+        for name, angle in self.head.axes_rad.items():
+            data.joint(name).qpos[0] = angle
         data.joint("yaw").qpos[0] = self._yaw_rad
         for name, place in self._places.items():
             moved = (
@@ -248,4 +266,4 @@ class Simulator:
 
     def _in_world(self, point_m: Array) -> Array:
         # Places are in the rig's frame at the start: targets do not turn with the rig.
-        return point_m + self._model.body("rig_base").pos
+        return point_m + self._model.body(STAND).pos

@@ -1,4 +1,4 @@
-"""Ground truth of a scene from MuJoCo's own kinematics and ray casting; vergence_rig's geometry is not used."""
+"""Ground truth of a scene from MuJoCo's own kinematics and ray casting; vergence_rig's kinematics is not used."""
 
 import math
 from collections.abc import Mapping
@@ -8,9 +8,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from vergence_rig.geometry import EyeAngles, angle_between
+from vergence_rig.head_bodies import BASE, EYES, TILT
+from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_sim.optics import Lens
 from vergence_sim.parameters import TARGETS
 from vergence_sim.scene import EXTRA_CUBES
+from vergence_sim.true_gaze import TrueGaze
 
 Array = npt.NDArray[np.float64]
 
@@ -49,6 +53,8 @@ class Truth:
     elevation_error_rad: float
     left_error_rad: float
     right_error_rad: float
+    left_principal_error_rad: float
+    right_principal_error_rad: float
     mean_disparity_px: float
     left_visible_share: float
     right_visible_share: float
@@ -57,11 +63,12 @@ class Truth:
 
 
 class GroundTruth:
-    """Reads a MuJoCo model. Eyes are the bodies `left_camera`, `right_camera` and their cameras."""
+    """Reads a MuJoCo model. Eyes are its cameras `left`, `right` and the sites of their foveas."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, lenses: Mapping[str, Lens]) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, lenses: Mapping[str, Lens], head: Rig) -> None:
         self._model, self._data = model, data
         self._lenses = lenses
+        self._gaze = TrueGaze(head)
         self._geoms = {
             name: [
                 i
@@ -81,32 +88,33 @@ class GroundTruth:
 
     def target_point_world(self, target: str) -> Array:
         """Return where the ray from the rig's origin through the target's centre meets its surface (3,), in world."""
-        origin = np.array(self._data.body("rig_base").xpos)
+        origin = np.array(self._data.body(BASE).xpos)
         centre = np.array(self._data.body(target).xpos)
         direction = centre - origin
         distance = self._cast(origin, direction, self._geoms[target])
         return origin + direction * distance if math.isfinite(distance) else centre
 
-    def evaluate(self, target: str, joints_rad: dict[str, float]) -> Truth:
+    def evaluate(self, target: str) -> Truth:
         """Return the ground truth about a target; the model's kinematics must be up to date."""
-        data = self._data
-        base = data.body("rig_base")
         point = self.target_point_world(target)
-        local = np.array(base.xmat).reshape(3, 3).T @ (point - np.array(base.xpos))
-        errors = {eye: self._eye_error(eye, point) for eye in ("left", "right")}
+        local = self._in_rig(point)
+        errors = {eye: self.angle_to_fovea(eye, point) for eye in ("left", "right")}
         vergence_error, version_error, elevation_error = self.axis_errors(point)
         samples, shares = self._samples(target)
+        eyes = self.eye_angles()
         return Truth(
             target=target,
             target_point_m=local,
-            pan_left_rad=joints_rad["pan_left"],
-            pan_right_rad=joints_rad["pan_right"],
-            tilt_rad=joints_rad["tilt"],
+            pan_left_rad=eyes.pan_left_rad,
+            pan_right_rad=eyes.pan_right_rad,
+            tilt_rad=eyes.tilt_rad,
             vergence_error_rad=vergence_error,
             version_error_rad=version_error,
             elevation_error_rad=elevation_error,
             left_error_rad=errors["left"],
             right_error_rad=errors["right"],
+            left_principal_error_rad=self.angle_to_principal_point("left", point),
+            right_principal_error_rad=self.angle_to_principal_point("right", point),
             mean_disparity_px=self._mean_disparity(samples),
             left_visible_share=shares["left"],
             right_visible_share=shares["right"],
@@ -158,29 +166,36 @@ class GroundTruth:
         index = self._cameras[eye]
         return self._data.cam_xpos[index].copy(), self._data.cam_xmat[index].reshape(3, 3).copy()
 
-    def _eye_error(self, eye: str, point: Array) -> float:
-        body = self._data.body(f"{eye}_camera")
-        axis = np.array(body.xmat).reshape(3, 3)[:, 0]
-        ray = point - np.array(body.xpos)
-        return math.acos(max(-1.0, min(1.0, float(axis @ ray) / float(np.linalg.norm(ray)))))
+    def angle_to_fovea(self, eye: str, point: Array) -> float:
+        """Return the angle between a world point and an eye's optical axis, as rig.yaml defines it [rad]."""
+        site = self._data.site(f"{eye}_fovea")
+        return angle_between(np.array(site.xmat).reshape(3, 3)[:, 0], point - np.array(site.xpos))
+
+    def angle_to_principal_point(self, eye: str, point: Array) -> float:
+        """Return the angle between a world point and a camera's own axis, that of its principal point [rad]."""
+        origin, rotation = self._camera(eye)
+        return angle_between(-rotation[:, 2], point - origin)
+
+    def eye_angles(self) -> EyeAngles:
+        """Return the angles of both optical axes and the tilt."""
+        bar = np.array(self._data.body(TILT).xmat).reshape(3, 3)
+        pans = []
+        for eye in EYES:
+            x, y, _ = bar.T @ np.array(self._data.site(f"{eye}_fovea").xmat).reshape(3, 3)[:, 0]
+            pans.append(math.atan2(y, x))
+        base = np.array(self._data.body(BASE).xmat).reshape(3, 3)
+        x, _, z = (base.T @ bar)[:, 0]
+        return EyeAngles(pans[0], pans[1], math.atan2(-z, x))
 
     def axis_errors(self, point: Array) -> tuple[float, float, float]:
-        """Return the errors (vergence, version, tilt) to a world point [rad], in the tilt bar's own axes."""
-        bar = self._data.body("tilt_bar")
-        rotation = np.array(bar.xmat).reshape(3, 3)
-        wanted, present = {}, {}
-        for eye in ("left", "right"):
-            body = self._data.body(f"{eye}_camera")
-            ray = rotation.T @ (point - np.array(body.xpos))
-            axis = rotation.T @ np.array(body.xmat).reshape(3, 3)[:, 0]
-            # In the plane through the eyes and the target, in which the eyes would pan once the tilt is right.
-            wanted[eye] = math.atan2(ray[1], math.hypot(ray[0], ray[2]))
-            present[eye] = math.atan2(axis[1], axis[0])
-        middle = rotation.T @ (point - np.array(bar.xpos))
-        elevation = math.atan2(-middle[2], middle[0])
-        vergence = (wanted["right"] - wanted["left"]) - (present["right"] - present["left"])
-        version = 0.5 * (wanted["left"] + wanted["right"]) - 0.5 * (present["left"] + present["right"])
-        return vergence, version, elevation
+        """Return how much vergence, version and tilt are short of a world point [rad]; NaN where no angles reach it."""
+        present = np.array([self._data.joint(name).qpos[0] for name in JOINT_NAMES])
+        left, right, tilt = (self._gaze.hinges(self._in_rig(point)) - present).tolist()
+        return right - left, 0.5 * (left + right), tilt
+
+    def _in_rig(self, point: Array) -> Array:
+        base = self._data.body(BASE)
+        return np.asarray(np.array(base.xmat).reshape(3, 3).T @ (point - np.array(base.xpos)))
 
     def _outline(self, target: str) -> list[Array]:
         points = []

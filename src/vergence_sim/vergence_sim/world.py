@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from vergence_rig.rig import CameraSpec
 from vergence_sim.optics import Lens
 from vergence_sim.parameters import SimParameters
 
@@ -24,6 +25,10 @@ class World(Protocol):
     def lenses(self) -> Mapping[str, Lens]:
         """The lenses of both eyes."""
 
+    @property
+    def calibrations(self) -> Mapping[str, CameraSpec | None]:
+        """What both cameras publish of themselves, by eye; None for one that is not calibrated."""
+
     def set_parameters(self, parameters: SimParameters) -> None:
         """Change the parameters that are not fixed at the start."""
 
@@ -40,7 +45,7 @@ class World(Protocol):
         """Return the joint angles as a driver without feedback publishes them [rad]."""
 
     def true_joints(self) -> dict[str, float]:
-        """Return where the shafts really are [rad]."""
+        """Return where the shafts really are, as joints [rad]."""
 
     def close(self) -> None:
         """Free what the world holds."""

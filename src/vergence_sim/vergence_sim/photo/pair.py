@@ -22,6 +22,7 @@ Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
 
 _FINEST = 1.25
+_TILT_STEPS = 20
 FOCAL_PER_WIDTH = 0.85
 """Focal length over image width that is assumed where none is given: a webcam's, about 61 degrees wide."""
 
@@ -108,11 +109,19 @@ class PhotoPair:
         # Straight ahead, an eye's optical frame (x right, y down, z forward) is rig_base's (-y, -z, x).
         return np.array([1.0, -left, -y]), np.array([1.0, -right, -y])
 
-    def fixation(self, point: PhotoPoint) -> EyeAngles:
-        """Return the angles that bring a point to both foveas: of its two rays, which share one tilt."""
+    def fixation(self, point: PhotoPoint, pitch_rad: float = 0.0) -> EyeAngles:
+        """Return the angles that bring a point to both foveas, of eyes whose axes are pitched on their pan axes [rad].
+
+        Both rays share one tilt. Pitched eyes at different pans do not quite: the mean of both is level then.
+        """
         (_, left, up), (_, right, _) = (ray.tolist() for ray in self.rays(point))
-        forward = math.hypot(1.0, up)
-        return EyeAngles(math.atan2(left, forward), math.atan2(right, forward), math.atan2(-up, 1.0))
+        tilt = math.atan2(-up, 1.0) - pitch_rad
+        lateral = (left, right) if point.depth_known else (left,)
+        pans, down = _on_bar(lateral, up, tilt)
+        for _ in range(_TILT_STEPS if pitch_rad else 0):
+            tilt += down - pitch_rad
+            pans, down = _on_bar(lateral, up, tilt)
+        return EyeAngles(pans[0], pans[1] if point.depth_known else math.nan, tilt)
 
     def on_axes(self, angles: EyeAngles) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the pixels (x, y), (x, y) of the left and the right photograph on the eyes' pan directions."""
@@ -122,13 +131,15 @@ class PhotoPair:
             pixels.append((self.cx_px - self.fx_px * y / x, self.cy_px - self.fx_px * z / x))
         return pixels[0], pixels[1]
 
-    def start_towards(self, point: PhotoPoint, camera: CameraSpec, margin_px: float) -> EyeAngles:
+    def start_towards(
+        self, point: PhotoPoint, camera: CameraSpec, margin_px: float, pitch_rad: float = 0.0
+    ) -> EyeAngles:
         """Return parallel eyes straight ahead, or the nearest such pose that shows a point to the eyes.
 
         It is shown at least `margin_px` from the border of an image of `camera`; a point without a disparity to the
         left eye alone. As the right eye turns with the left one, the vergence at the start says nothing of the point.
         """
-        wanted = self.fixation(point)
+        wanted = self.fixation(point, pitch_rad)
         across = math.atan((0.5 * camera.width_px - margin_px) / camera.fx_px)
         down = math.atan((0.5 * camera.height_px - margin_px) / camera.fy_px)
         pans = (wanted.pan_left_rad, wanted.pan_right_rad) if point.depth_known else (wanted.pan_left_rad,)
@@ -152,6 +163,15 @@ def read_pair(
 ) -> PhotoPair:
     """Read two picture files; raises PhotoError for one that cannot be read, or for two sizes."""
     return PhotoPair(_read("left", left), _read("right", right), fx_px, cx_px, cy_px)
+
+
+def _on_bar(lateral: tuple[float, ...], up: float, tilt_rad: float) -> tuple[list[float], float]:
+    """Return the pans and the mean angle below the tilted bar's plane of directions (1, lateral, up) [rad]."""
+    cos, sin = math.cos(tilt_rad), math.sin(tilt_rad)
+    forward, above = cos - sin * up, sin + cos * up
+    pans = [math.atan2(y, forward) for y in lateral]
+    downs = [math.atan2(-above, math.hypot(forward, y)) for y in lateral]
+    return pans, sum(downs) / len(downs)
 
 
 def _read(side: str, path: str | Path) -> Image:

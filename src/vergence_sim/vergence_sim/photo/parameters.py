@@ -1,14 +1,14 @@
-"""photo_node's parameters: the photographs, the head before them, and how its joints differ from rig.yaml."""
+"""photo_node's parameters: the photographs, the head before them, and how its servos differ from its description."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from vergence_rig.parameters import REQUIRED, Groups, ParameterError, Parameters, parameter
-from vergence_rig.rig import JOINT_NAMES, Rig
-from vergence_rig.servo import PRESETS
-from vergence_sim.camera_parameters import CameraParameters, LeftCameraParameters, RightCameraParameters
+from vergence_rig.rig import Joints, Rig
+from vergence_rig.servo import PRESETS, ServoSpec
+from vergence_sim.camera_parameters import CameraParameters, RightCameraParameters
 from vergence_sim.clock_parameters import ClockParameters
+from vergence_sim.heads import HeadParameters
 from vergence_sim.parameters import SimParameters, SimulationParameters
-from vergence_sim.photo.joints import Plant
 from vergence_sim.photo.pair import PhotoPoint
 
 
@@ -87,7 +87,7 @@ class PhotoParameters(Parameters):
     rig: str = parameter("", "path of rig.yaml; empty for the built-in rig", read_only=True)
     preset: str = parameter(
         "realistic",
-        "realistic: imperfections as the other parameters say; ideal: ideal servos and cameras, whatever they say",
+        "realistic: imperfections as the other parameters say; ideal: ideal head, servos and cameras whatever they say",
         choices=("realistic", "ideal"),
         read_only=True,
     )
@@ -117,11 +117,11 @@ class PhotoParameters(Parameters):
 
 @dataclass(frozen=True)
 class PlantParameters(Parameters):
-    """The joints as they really are; joint_states is what a driver publishes that has only rig.yaml."""
+    """The servos as they really are; joint_states is what a driver publishes that has only rig.yaml."""
 
     servo: str = parameter(
         "rig",
-        "servos that really turn the head: those of rig.yaml (rig), or all of one kind",
+        "servos that really turn the head: its own, those of rig.yaml for a built-in head (rig), or all of one kind",
         choices=("rig", *PRESETS),
         read_only=True,
     )
@@ -131,45 +131,33 @@ class PlantParameters(Parameters):
     speed_scale: float = parameter(
         1.0, "real speed of every servo, as a multiple of the described one", minimum=0.01, maximum=20, read_only=True
     )
-    angle_scale: float = parameter(
-        1.0, "real angle of every joint, as a multiple of the commanded one", minimum=0.5, maximum=2, read_only=True
-    )
-    pan_left_zero_rad: float = parameter(
-        0.0, "real angle of the left pan at a command of 0", unit="rad", minimum=-0.3, maximum=0.3, read_only=True
-    )
-    pan_right_zero_rad: float = parameter(
-        0.0, "real angle of the right pan at a command of 0", unit="rad", minimum=-0.3, maximum=0.3, read_only=True
-    )
-    tilt_zero_rad: float = parameter(
-        0.0, "real angle of the tilt at a command of 0", unit="rad", minimum=-0.3, maximum=0.3, read_only=True
-    )
 
-    def plant(self, rig: Rig) -> Plant:
-        """Return the plant that these describe."""
-        return Plant(
-            servo=None if self.servo == "rig" else PRESETS[self.servo],
-            dead_band_scale=self.dead_band_scale,
-            speed_scale=self.speed_scale,
-            angle_scale=self.angle_scale,
-            zero_rad={name: float(getattr(self, f"{name}_zero_rad")) for name in JOINT_NAMES},
+    def fitted(self, head: Rig) -> Rig:
+        """Return a head with the servos that these describe; its joint limits stay."""
+        return replace(head, joints=Joints(*(replace(j, servo=self._servo(j.servo)) for _, j in head.joints.items())))
+
+    def _servo(self, described: ServoSpec) -> ServoSpec:
+        servo = described if self.servo == "rig" else PRESETS[self.servo]
+        return servo.replaced(
+            dead_band_rad=servo.dead_band_rad * self.dead_band_scale, speed_rad_s=servo.speed_rad_s * self.speed_scale
         )
 
 
 GROUPS: Groups = (
     ("", PhotoParameters),
+    ("head.", HeadParameters),
     ("plant.", PlantParameters),
     ("camera.", CameraParameters),
-    ("left_camera.", LeftCameraParameters),
     ("right_camera.", RightCameraParameters),
     ("clock.", ClockParameters),
 )
 
 
 def sim_parameters(
-    photo: PhotoParameters, camera: CameraParameters, left: LeftCameraParameters, right: RightCameraParameters
+    photo: PhotoParameters, head: HeadParameters, camera: CameraParameters, right: RightCameraParameters
 ) -> SimParameters:
-    """Return the imperfections of the cameras as the simulator's parts take them, the preset applied."""
+    """Return the head and the cameras' imperfections as the simulator's parts take them, the preset applied."""
     simulation = SimulationParameters(
         rig=photo.rig, preset=photo.preset, seed=photo.seed, joint_rate_hz=photo.joint_rate_hz
     )
-    return SimParameters(simulation=simulation, camera=camera, left_camera=left, right_camera=right).effective()
+    return SimParameters(simulation=simulation, head=head, camera=camera, right_camera=right).effective()

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.geometry import ROTATION_EYE_FROM_OPTICAL, rotation_rig_from_eye
+from vergence_rig.rig import EyeMount
 from vergence_sim.optics import Lens
 
 Array = npt.NDArray[np.float64]
@@ -23,11 +24,11 @@ _BLUR_PX = (3.0, 12.0, 40.0)
 _PHOTO_FROM_RIG = ROTATION_EYE_FROM_OPTICAL.T
 
 
-def mount_rotation(roll_rad: float, pitch_rad: float) -> Array:
-    """Return how a camera is turned in its mount (3, 3), in the eye's frame: rolled about x, then pitched about y."""
-    cos_roll, sin_roll = math.cos(roll_rad), math.sin(roll_rad)
-    roll = np.array([[1.0, 0.0, 0.0], [0.0, cos_roll, -sin_roll], [0.0, sin_roll, cos_roll]])
-    return roll @ rotation_rig_from_eye(0.0, pitch_rad)
+def mount_rotation(mount: EyeMount) -> Array:
+    """Return how a camera is turned on its pan axis (3, 3): by roll, pitch, then yaw about the pan frame's axes."""
+    cos, sin = math.cos(mount.roll_rad), math.sin(mount.roll_rad)
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]])
+    return rotation_rig_from_eye(mount.yaw_rad, 0.0) @ rotation_rig_from_eye(0.0, mount.pitch_rad) @ roll
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ class PhotoEye:
         photograph: with its margin.
         matrix: (3, 3) camera matrix of the photograph.
         lens: the eye's camera; it distorts the view.
-        mount: (3, 3) rotation of the camera in its mount.
+        mount: (3, 3) rotation of the camera on its pan axis; where its lens is cannot be seen.
     """
 
     def __init__(self, photograph: Padded, matrix: Array, lens: Lens, mount: Array) -> None:
@@ -125,6 +126,10 @@ class PhotoEye:
         camera = self._lens.camera
         ideal = camera.fx_px * x / depth + camera.cx_px, camera.fy_px * y / depth + camera.cy_px
         return self._lens.distorted(ideal)
+
+    def axis(self, pan_rad: float, tilt_rad: float) -> Array:
+        """Return the unit axis (3,) of the camera itself, that of its principal point, at its axes' angles [rad]."""
+        return np.asarray((rotation_rig_from_eye(pan_rad, tilt_rad) @ self._mount)[:, 0])
 
     def _rig_from_optical(self, pan_rad: float, tilt_rad: float) -> Array:
         return rotation_rig_from_eye(pan_rad, tilt_rad) @ self._mount @ ROTATION_EYE_FROM_OPTICAL

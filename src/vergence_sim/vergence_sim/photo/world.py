@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from vergence_rig.geometry import EyeAngles
-from vergence_rig.rig import CameraSpec, Rig, default_rig
+from vergence_rig.geometry import EyeAngles, angle_between, rotation_rig_from_eye
+from vergence_rig.rig import JOINT_NAMES, CameraSpec, Rig, default_rig
+from vergence_sim.head import Head
+from vergence_sim.heads import published_cameras, simulated_head
 from vergence_sim.optics import Lens, Sensor, motion_blurred
 from vergence_sim.parameters import SimParameters
-from vergence_sim.photo.joints import PhotoHead, Plant
 from vergence_sim.photo.pair import PhotoPair, PhotoPoint
 from vergence_sim.photo.views import PhotoEye, mount_rotation
 from vergence_sim.world import EYES
@@ -21,7 +22,8 @@ Image = npt.NDArray[np.uint8]
 class PhotoWorld:
     """A head before a pair of photographs. Deterministic: the same parameters and calls give the same pictures.
 
-    Time is `time_s`, from 0, and moves only by `advance_to`. The eyes' baseline plays no part: angles are all there is.
+    Time is `time_s`, from 0, and moves only by `advance_to`. Angles are all there is: axes, mounts, zeros, scales and
+    cameras are the head's, but where its axes and lenses are plays no part, as a photograph has no parallax.
     """
 
     def __init__(
@@ -29,20 +31,29 @@ class PhotoWorld:
         pair: PhotoPair,
         parameters: SimParameters | None = None,
         rig: Rig | None = None,
-        plant: Plant | None = None,
+        head: Rig | None = None,
     ) -> None:
+        """Put a head before the photographs.
+
+        Args:
+            pair: the photographs.
+            parameters: head and cameras.
+            rig: that a driver and the other nodes are given; the built-in one if none.
+            head: the head that is simulated; the parameters', its images cut to the rig's size, if none.
+        """
         self.pair = pair
-        self.parameters = (parameters or SimParameters()).effective()
+        self.parameters = p = (parameters or SimParameters()).effective()
         self.rig = rig or default_rig()
-        self.head = PhotoHead(self.rig, plant)
+        size_px = self.rig.left_camera.width_px, self.rig.left_camera.height_px
+        built = cropped(simulated_head(p.head, self.rig), *size_px) if head is None else head
+        self.head = Head(self.rig, built)
         self.time_s = 0.0
-        p = self.parameters
-        cameras = {"left": self.rig.left_camera, "right": self.rig.right_camera}
-        mounts = {"left": (p.left_camera.roll_rad, 0.0), "right": (p.right_camera.roll_rad, p.right_camera.pitch_rad)}
-        self.lenses = {eye: Lens(camera, p.camera.distortion) for eye, camera in cameras.items()}
-        *photographs, matrix = pair.seen_at(self.rig.left_camera.fx_px)
+        cameras = {"left": built.left_camera, "right": built.right_camera}
+        self.lenses = {eye: Lens(camera) for eye, camera in cameras.items()}
+        self.calibrations = published_cameras(p.head.camera_info, self.rig, built)
+        *photographs, matrix = pair.seen_at(built.left_camera.fx_px)
         self._eyes = {
-            eye: PhotoEye(photograph, matrix, self.lenses[eye], mount_rotation(*mounts[eye]))
+            eye: PhotoEye(photograph, matrix, self.lenses[eye], mount_rotation(built.mount(eye == "left")))
             for eye, photograph in zip(EYES, photographs, strict=True)
         }
         seeds = np.random.SeedSequence(p.simulation.seed).spawn(2)
@@ -69,13 +80,13 @@ class PhotoWorld:
 
     def expose(self, eye: str) -> Callable[[], Image]:
         """Expose one eye now; what is returned makes the picture of it, on any thread, one after the other."""
-        joints, rates, parameters = self.head.true_rad, self.head.velocity_rad_s, self.parameters
+        axes, rates, parameters = self.head.axes_rad, self.head.axis_speeds_rad_s, self.parameters
         lens, pan = self.lenses[eye], f"pan_{eye}"
         smear = lens.camera.fx_px * parameters.camera.exposure_s
         motion_px = smear * rates[pan], smear * rates["tilt"]
 
         def develop() -> Image:
-            view = motion_blurred(self._eyes[eye].view(joints[pan], joints["tilt"]), motion_px)
+            view = motion_blurred(self._eyes[eye].view(axes[pan], axes["tilt"]), motion_px)
             return self._sensors[eye].apply(lens.apply(view), parameters)
 
         return develop
@@ -84,9 +95,32 @@ class PhotoWorld:
         """Return what one eye, "left" or "right", sees now: (h, w, 3) BGR uint8."""
         return self.expose(eye)()
 
+    def fixation(self, point: PhotoPoint) -> EyeAngles:
+        """Return the angles of this head that bring a point to both foveas."""
+        return self.pair.fixation(point, self.head.real.mean_pitch_rad)
+
+    def angles_to_foveas(self, point: PhotoPoint) -> tuple[float, float]:
+        """Return the angles between a point and the left and the right optical axis [rad]; NaN without its depth."""
+        eyes, pitch = self.eye_angles, self.head.real.mean_pitch_rad
+        level = rotation_rig_from_eye(0.0, pitch)[:, 0]
+        left, right = (
+            angle_between(rotation_rig_from_eye(pan, eyes.tilt_rad) @ level, ray)
+            for pan, ray in zip((eyes.pan_left_rad, eyes.pan_right_rad), self.pair.rays(point), strict=True)
+        )
+        return left, right
+
+    def angles_to_principal_points(self, point: PhotoPoint) -> tuple[float, float]:
+        """Return the angles between a point and both cameras' own axes [rad]; NaN without its depth."""
+        axes = self.head.axes_rad
+        left, right = (
+            angle_between(self._eyes[eye].axis(axes[f"pan_{eye}"], axes["tilt"]), ray)
+            for eye, ray in zip(EYES, self.pair.rays(point), strict=True)
+        )
+        return left, right
+
     def errors_to(self, point: PhotoPoint) -> tuple[float, float, float]:
         """Return how much vergence, version and tilt are short of a point of the photographs [rad]."""
-        wanted, present = self.pair.fixation(point), self.eye_angles
+        wanted, present = self.fixation(point), self.eye_angles
         return (
             wanted.vergence_rad - present.vergence_rad,
             wanted.version_rad - present.version_rad,
@@ -95,19 +129,19 @@ class PhotoWorld:
 
     def project(self, eye: str, point: PhotoPoint) -> tuple[float, float]:
         """Return the pixel (x, y) of an eye's image, as its lens distorts it, at which a point is seen now."""
-        joints, rays = self.head.true_rad, self.pair.rays(point)
-        return self._eyes[eye].project(rays[EYES.index(eye)], joints[f"pan_{eye}"], joints["tilt"])
+        axes, rays = self.head.axes_rad, self.pair.rays(point)
+        return self._eyes[eye].project(rays[EYES.index(eye)], axes[f"pan_{eye}"], axes["tilt"])
 
     def outside_share(self, eye: str) -> float:
         """Return the share of an eye's view that now lies outside its photograph."""
-        joints = self.head.true_rad
-        return self._eyes[eye].outside_share(joints[f"pan_{eye}"], joints["tilt"])
+        axes = self.head.axes_rad
+        return self._eyes[eye].outside_share(axes[f"pan_{eye}"], axes["tilt"])
 
     @property
     def eye_angles(self) -> EyeAngles:
-        """Where the shafts really are."""
-        joints = self.head.true_rad
-        return EyeAngles(joints["pan_left"], joints["pan_right"], joints["tilt"])
+        """Where both optical axes and the tilt really are."""
+        true = self.head.true_rad
+        return EyeAngles(*self.head.real.eye_angles([true[name] for name in JOINT_NAMES]))
 
     def close(self) -> None:
         """Nothing is held."""
@@ -117,7 +151,7 @@ class PhotoWorld:
         return self.head.modelled_rad
 
     def true_joints(self) -> dict[str, float]:
-        """Return where the shafts really are [rad]."""
+        """Return where the shafts really are, as joints [rad]."""
         return self.head.true_rad
 
 

@@ -11,14 +11,14 @@ from std_msgs.msg import Header
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet
 from vergence_msgs.msg import TrueVergence
-from vergence_rig.geometry import GeometryError, eye_direction, point_at
+from vergence_rig.geometry import GeometryError, point_at
 from vergence_rig.parameters import ParameterError
 from vergence_rig.rig import CameraSpec
 from vergence_rig.rig_file import load_rig
 from vergence_rig.servo import IDEAL
-from vergence_sim.camera_parameters import CameraParameters, LeftCameraParameters, RightCameraParameters
+from vergence_sim.camera_parameters import CameraParameters, RightCameraParameters
+from vergence_sim.heads import HeadParameters, simulated_head
 from vergence_sim.parameters import SimParameters
-from vergence_sim.photo.joints import Plant
 from vergence_sim.photo.pair import PhotoPoint, read_pair
 from vergence_sim.photo.parameters import GROUPS, PhotoParameters, PlantParameters, sim_parameters
 from vergence_sim.photo.world import PhotoWorld, cropped
@@ -39,11 +39,14 @@ class PhotoNode(RealTimeNode):
 
     def _prepare(self, settings: ParameterSet) -> None:
         photo = settings.get(PhotoParameters)
-        rig = cropped(load_rig(photo.rig), photo.view_width_px, photo.view_height_px)
+        view_px = photo.view_width_px, photo.view_height_px
         # An ideal head is described as one: its driver knows where it is.
         ideal = photo.preset == "ideal"
-        self._rig = rig.with_servos(IDEAL) if ideal else rig
-        self._plant = Plant() if ideal else settings.get(PlantParameters).plant(rig)
+        rig = load_rig(photo.rig)
+        rig = rig.with_servos(IDEAL) if ideal else rig
+        head = simulated_head(self._sim_parameters(settings).head, rig)
+        self._rig = cropped(rig, *view_px)
+        self._head = cropped(head if ideal else settings.get(PlantParameters).fitted(head), *view_px)
         self._pair = read_pair(photo.left, photo.right, photo.fx_px, photo.cx_px or None, photo.cy_px or None)
         for point in photo.points:
             self._pair.check(point)
@@ -52,13 +55,13 @@ class PhotoNode(RealTimeNode):
         self._true_target = self._qos.create_publisher(PointStamped, "ground_truth/target")
 
     def _make_world(self) -> PhotoWorld:
-        return PhotoWorld(self._pair, self._sim_parameters(self._settings), self._rig, self._plant)
+        return PhotoWorld(self._pair, self._sim_parameters(self._settings), self._rig, self._head)
 
     def _sim_parameters(self, settings: ParameterSet) -> SimParameters:
         return sim_parameters(
             settings.get(PhotoParameters),
+            settings.get(HeadParameters),
             settings.get(CameraParameters),
-            settings.get(LeftCameraParameters),
             settings.get(RightCameraParameters),
         )
 
@@ -81,31 +84,31 @@ def _true_vergence(stamp: Any, world: PhotoWorld, point: PhotoPoint, name: str) 
 
     What needs a disparity that is not known is NaN.
     """
-    wanted, joints = world.pair.fixation(point), world.true_joints()
+    eyes = world.eye_angles
     try:
-        place = point_at(wanted.version_rad, wanted.vergence_rad, wanted.tilt_rad, world.rig.baseline_m)
+        ahead = world.pair.fixation(point)
+        place = point_at(ahead.version_rad, ahead.vergence_rad, ahead.tilt_rad, world.rig.baseline_m)
     except GeometryError:
         place = np.full(3, math.nan)
     vergence, version, tilt = world.errors_to(point)
     pixels = {eye: world.project(eye, point) for eye in EYES}
-    off = {
-        eye: float(np.arccos(np.clip(eye_direction(joints[f"pan_{eye}"], joints["tilt"]) @ _unit(ray), -1.0, 1.0)))
-        for eye, ray in zip(EYES, world.pair.rays(point), strict=True)
-    }
+    off, off_principal = world.angles_to_foveas(point), world.angles_to_principal_points(point)
     seen = {eye: _shows(world.lenses[eye].camera, pixels[eye]) for eye in EYES}
     x, y, z = (float(value) for value in place)
     return TrueVergence(
         header=Header(stamp=stamp, frame_id="rig_base"),
         target=name,
         target_point=Point(x=x, y=y, z=z),
-        pan_left_rad=joints["pan_left"],
-        pan_right_rad=joints["pan_right"],
-        tilt_rad=joints["tilt"],
+        pan_left_rad=eyes.pan_left_rad,
+        pan_right_rad=eyes.pan_right_rad,
+        tilt_rad=eyes.tilt_rad,
         vergence_error_rad=vergence,
         version_error_rad=version,
         elevation_error_rad=tilt,
-        left_error_rad=off["left"],
-        right_error_rad=off["right"],
+        left_error_rad=off[0],
+        right_error_rad=off[1],
+        left_principal_error_rad=off_principal[0],
+        right_principal_error_rad=off_principal[1],
         mean_disparity_px=pixels["left"][0] - pixels["right"][0],
         left_visible_share=seen["left"],
         right_visible_share=seen["right"],
@@ -121,10 +124,6 @@ def _shows(camera: CameraSpec, pixel: tuple[float, float]) -> float:
     if not all(map(math.isfinite, pixel)):
         return math.nan
     return float(0 <= pixel[0] <= camera.width_px - 1 and 0 <= pixel[1] <= camera.height_px - 1)
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -217,7 +217,7 @@ class RealTimeNode(Node):
             return
         header = Header(stamp=stamp, frame_id=f"{event.eye}_camera_optical_frame")
         picture = self._image_pool.submit(world.expose(event.eye))
-        info = camera_info(header, world.lenses[event.eye])
+        info = camera_info(header, world.lenses[event.eye].camera, world.calibrations[event.eye])
         latency_s = world.parameters.camera.latency_s
         if self._clock_server is not None:
             latency_s += self._settings.get(ClockParameters).image_latency_s

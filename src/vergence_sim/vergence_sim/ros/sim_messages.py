@@ -9,7 +9,7 @@ from sensor_msgs.msg import CameraInfo, JointState
 from std_msgs.msg import Header
 
 from vergence_msgs.msg import BoundingBox, TrueBoxes, TrueVergence
-from vergence_sim.optics import Lens
+from vergence_rig.rig import CameraSpec
 from vergence_sim.truth import TrueBox, Truth
 
 
@@ -23,20 +23,20 @@ def joint_state(stamp: Time, angles_rad: Mapping[str, float], speeds_rad_s: Mapp
     )
 
 
-def camera_info(header: Header, lens: Lens) -> CameraInfo:
-    """Return the exact calibration of this camera."""
-    camera = lens.camera
-    matrix = [camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0]
-    projection = [camera.fx_px, 0.0, camera.cx_px, 0.0, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 0.0, 1.0, 0.0]
+def camera_info(header: Header, camera: CameraSpec, calibration: CameraSpec | None) -> CameraInfo:
+    """Return what a camera says of itself; without a calibration its matrices are 0, as ROS defines it."""
+    if calibration is None:
+        return CameraInfo(header=header, width=camera.width_px, height=camera.height_px)
+    c = calibration
     return CameraInfo(
         header=header,
-        width=camera.width_px,
-        height=camera.height_px,
+        width=c.width_px,
+        height=c.height_px,
         distortion_model="plumb_bob",
-        d=[float(value) for value in lens.distortion],
-        k=matrix,
+        d=[float(value) for value in c.distortion],
+        k=[c.fx_px, 0.0, c.cx_px, 0.0, c.fy_px, c.cy_px, 0.0, 0.0, 1.0],
         r=[float(value) for value in np.eye(3).ravel()],
-        p=projection,
+        p=[c.fx_px, 0.0, c.cx_px, 0.0, 0.0, c.fy_px, c.cy_px, 0.0, 0.0, 0.0, 1.0, 0.0],
     )
 
 
@@ -55,6 +55,8 @@ def true_vergence(stamp: Time, frame_id: str, truth: Truth) -> TrueVergence:
         elevation_error_rad=truth.elevation_error_rad,
         left_error_rad=truth.left_error_rad,
         right_error_rad=truth.right_error_rad,
+        left_principal_error_rad=truth.left_principal_error_rad,
+        right_principal_error_rad=truth.right_principal_error_rad,
         mean_disparity_px=truth.mean_disparity_px,
         left_visible_share=truth.left_visible_share,
         right_visible_share=truth.right_visible_share,
