@@ -79,3 +79,13 @@ def test_a_described_head_looks_at_a_point_by_its_joints(seed: int) -> None:
     assert outcome.result is Result.AT_POINT, outcome
     assert np.abs(np.degrees(head.true_errors_rad())).max() < 0.05
     assert report.fixation_m == pytest.approx(point, abs=0.004)
+
+
+@pytest.mark.parametrize("seed", [0, 3, 5])
+def test_a_head_that_is_not_yet_described_verges_on_what_was_clicked(seed: int) -> None:
+    rig = replace(default_rig().with_servos(SG90), zero_sigma_rad=0.05)
+    point = np.random.default_rng(seed).uniform((0.3, -0.2, -0.15), (1.5, 0.2, 0.15))
+    head, outcome, report = looked_at(rig, built_head(seed, SG90), point, GoalKind.PIXEL)
+    assert outcome.result is Result.VERGED, outcome
+    assert np.abs(np.degrees(head.true_errors_rad())).max() < 0.35
+    assert report.target.high_m > 2.0 * report.target.low_m  # as wide as the zeros are uncertain

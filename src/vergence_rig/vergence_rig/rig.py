@@ -153,7 +153,8 @@ class Joints:
 class Rig:
     """A binocular head: pan axes at y = +-baseline_m / 2 of `rig_base`, on top of one bar that tilts about y.
 
-    The tilt axis passes (tilt_axis_x_m, 0, tilt_axis_z_m).
+    The tilt axis passes (tilt_axis_x_m, 0, tilt_axis_z_m). `zero_sigma_rad` is the standard deviation of each pan's
+    zero and yaw together: distances by the joints are as uncertain, and commands may diverge by as much.
     """
 
     baseline_m: float = 0.065
@@ -165,9 +166,11 @@ class Rig:
     right_mount: EyeMount = field(default_factory=EyeMount)
     tilt_axis_x_m: float = 0.0
     tilt_axis_z_m: float = 0.0
+    zero_sigma_rad: float = 0.0
 
     def __post_init__(self) -> None:
         _check_number("baseline_m", self.baseline_m, 1e-3, 10.0, "m")
+        _check_number("zero_sigma_rad", self.zero_sigma_rad, 0.0, 0.2, "rad")
         _check_number("tilt_axis_x_m", self.tilt_axis_x_m, -1.0, 1.0, "m")
         _check_number("tilt_axis_z_m", self.tilt_axis_z_m, -1.0, 1.0, "m")
         _check_number("minimum_vergence_rad", self.minimum_vergence_rad, 0.0, 0.5 * math.pi, "rad")
@@ -192,6 +195,16 @@ class Rig:
     def tilt(self) -> JointSpec:
         """The joint of the bar that carries both eyes."""
         return self.joints.tilt
+
+    @property
+    def zero_error_rad(self) -> float:
+        """Largest error of the vergence that the pans' zeros leave [rad]."""
+        return 3.0 * math.sqrt(2.0) * self.zero_sigma_rad
+
+    @property
+    def least_vergence_rad(self) -> float:
+        """Smallest vergence that may be asked for [rad]: the minimum, as far as the zeros are known."""
+        return self.minimum_vergence_rad - self.zero_error_rad
 
     @property
     def mean_pitch_rad(self) -> float:

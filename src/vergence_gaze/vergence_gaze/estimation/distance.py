@@ -41,8 +41,9 @@ UNKNOWN = TargetPosition(np.full(3, math.nan), np.full((3, 3), math.nan), math.n
 
 
 def joint_variances(rig: Rig) -> Array:
-    """Return the variance of each shaft at rest (3,) [rad^2] that is left although its play is modelled."""
-    return np.array(
+    """Return the variance of each axis at rest (3,) [rad^2] that is left although its play is modelled."""
+    zeros = np.array([rig.zero_sigma_rad, rig.zero_sigma_rad, 0.0]) ** 2
+    return zeros + np.array(
         [
             (_PLAY_SIGMA_SHARE * 0.5 * math.hypot(servo.dead_band_rad, servo.backlash_rad)) ** 2
             + servo.pulse_step_rad**2 / 12.0

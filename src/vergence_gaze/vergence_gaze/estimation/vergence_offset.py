@@ -17,9 +17,9 @@ _WORST_SIGMA_RAD = 0.1
 
 
 def farthest_offset_rad(rig: Rig) -> float:
-    """Return how far the true vergence can be from the shafts' estimated one: both servos' play, and mounts."""
+    """Return how far the true vergence can be from the shafts' estimated one: both servos' play, mounts and zeros."""
     servos = (rig.joints.pan_left.servo, rig.joints.pan_right.servo)
-    return sum(2.0 * servo.uncertainty_rad for servo in servos) + _MOUNT_TOLERANCE_RAD
+    return sum(2.0 * servo.uncertainty_rad for servo in servos) + _MOUNT_TOLERANCE_RAD + rig.zero_error_rad
 
 
 class VergenceOffset:

@@ -92,10 +92,10 @@ def _pose(goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistor
     joints = np.array([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad])
     if goal.kind is GoalKind.RELATIVE_ANGLES:
         joints = joints + present
-    if joints[1] - joints[0] < rig.minimum_vergence_rad - 1e-6:
+    if joints[1] - joints[0] < rig.least_vergence_rad - 1e-6:
         raise GoalError(
             Result.UNREACHABLE,
-            f"the vergence must be at least {rig.minimum_vergence_rad:g} rad: got {joints[1] - joints[0]:.4f}",
+            f"the vergence must be at least {rig.least_vergence_rad:g} rad: got {joints[1] - joints[0]:.4f}",
         )
     _check_reach(dict(zip(("pan_left", "pan_right", "tilt"), joints.tolist(), strict=True)), rig, parameters)
     return RequestedPose(joints)
@@ -132,7 +132,7 @@ def _pixel(
 def _stereo_pixel(goal: Goal, rig: Rig, kinematics: Kinematics, joints: Array, stamp_s: float) -> RequestedTarget:
     _check_seen("the pixels", (*goal.left_xy, goal.right_xy[0]))
     angles = _angles(gaze_of_rays(kinematics, joints, joints, goal.left_xy, goal.right_xy[0]))
-    if angles[1] < rig.minimum_vergence_rad - _REACH_TOLERANCE_RAD:
+    if angles[1] < rig.least_vergence_rad - _REACH_TOLERANCE_RAD:
         raise GoalError(
             Result.UNREACHABLE,
             f"the rays of the two pixels must meet: they diverge by {-math.degrees(angles[1]):.1f} deg",

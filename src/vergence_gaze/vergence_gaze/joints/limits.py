@@ -18,7 +18,7 @@ _MARGIN_RAD = 1e-9
 class CommandLimits:
     """Joint, speed and minimum-vergence limits of a rig's commands. Angles are (3,): pan_left, pan_right, tilt [rad].
 
-    `minimum_vergence_rad` is that of the rig less the described play of both pans.
+    `minimum_vergence_rad` is the rig's least one less the described play of both pans.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -29,7 +29,7 @@ class CommandLimits:
         # The eyes' vergence is limited, not that of the commands: a shaft stays behind its command by half its play,
         # and commands that may not diverge by that could not turn the eyes to anything far away.
         play_rad = sum(pan.servo.half_play_rad for pan in joints[:2])
-        self.minimum_vergence_rad = rig.minimum_vergence_rad - play_rad
+        self.minimum_vergence_rad = rig.least_vergence_rad - play_rad
 
     def nearest(self, angles_rad: Array) -> Array:
         """Return the angles nearest to `angles_rad` that the limits allow: finite ones are expected."""

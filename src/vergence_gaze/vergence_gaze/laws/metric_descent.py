@@ -61,7 +61,7 @@ class MetricDescentLaw:
         self._p = parameters.of_law(MetricDescentParameters)
         self._inverse = ServoInverse(rig, parameters.servo)
         self._widest_rad = 2.0 * math.atan(0.5 * rig.baseline_m / self._p.nearest_m)
-        self._floor_rad = rig.minimum_vergence_rad
+        self._floor_rad = rig.least_vergence_rad
         self._gone = parameters.verged.contrast_leave
         self.reset()
 

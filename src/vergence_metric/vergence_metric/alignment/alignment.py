@@ -18,6 +18,7 @@ _INITIAL_PAIRS = 5  # estimates on each of the first pairs, at once
 _NEGLIGIBLE_PX = 0.05
 _GATE_SIGMAS, _GATE_PX = 4.0, 1.0
 _REJECTIONS_TO_RESTART = 5
+_KNOWN_WITHIN_PX = 24
 
 Grey = NDArray[np.uint8]
 
@@ -118,11 +119,14 @@ class Aligner:
 
     def _estimate(self, left: Grey, right: Grey) -> None:
         p = self._parameters
+        # Once it is known, what differs is an error of the estimate, or the head's gaze.
+        known, widest_px = self._estimated and not self._rejected, math.ceil(p.max_vertical_px * 1.5)
         estimate = estimate_misalignment(
             left,
             right,
             search_horizontal_px=p.search_px,
-            search_vertical_px=math.ceil(p.max_vertical_px * 1.5),
+            search_vertical_px=min(widest_px, _KNOWN_WITHIN_PX) if known else widest_px,
+            about_vertical_px=self._vertical.value if known else 0.0,
         )
         if estimate is not None:
             self._filter(estimate)
@@ -160,6 +164,6 @@ class _ScalarKalmanFilter:
 
 def _prior() -> tuple[_ScalarKalmanFilter, _ScalarKalmanFilter]:
     """Return the filters of vertical offset [px] and roll [rad] before the first estimate."""
-    return _ScalarKalmanFilter(sigma=20.0, drift=0.1), _ScalarKalmanFilter(
-        sigma=math.radians(1.5), drift=math.radians(0.02)
+    return _ScalarKalmanFilter(sigma=40.0, drift=0.1), _ScalarKalmanFilter(
+        sigma=math.radians(2.5), drift=math.radians(0.02)
     )

@@ -53,13 +53,14 @@ class Misalignment:
 
 
 def estimate_misalignment(
-    left: Grey, right: Grey, *, search_horizontal_px: int, search_vertical_px: int
+    left: Grey, right: Grey, *, search_horizontal_px: int, search_vertical_px: int, about_vertical_px: float = 0.0
 ) -> Misalignment | None:
     """Return the misalignment of two (h, w) uint8 images, None where too few patches match.
 
-    Patches are searched to `search_horizontal_px` on both sides and to `search_vertical_px` up and down.
+    Patches are searched to `search_horizontal_px` on both sides and to `search_vertical_px` up and down of where the
+    offset `about_vertical_px` has them.
     """
-    found = _matches(left, right, search_horizontal_px, search_vertical_px)
+    found = _matches(left, right, (search_horizontal_px, search_vertical_px), about_vertical_px)
     half_width = left.shape[1] / 2.0
     x = (found[:, 0] - (left.shape[1] - 1) / 2.0) / half_width
     y = (found[:, 1] - (left.shape[0] - 1) / 2.0) / half_width
@@ -108,7 +109,7 @@ def _consensus(design: NDArray[np.float64], offset: NDArray[np.float64], half_wi
     return squared[int(cost.argmin())] < _INLIER_PX**2
 
 
-def _matches(left: Grey, right: Grey, horizontal_px: int, vertical_px: int) -> NDArray[np.float64]:
+def _matches(left: Grey, right: Grey, reach_px: tuple[int, int], about_vertical_px: float) -> NDArray[np.float64]:
     """Return x_right, y_right and y_left - y_right [px] of each matched patch, (n, 3)."""
     size = (left.shape[1] // _COARSE, left.shape[0] // _COARSE)
     if min(size) < 4 * _COARSE_PATCH_PX:
@@ -116,10 +117,10 @@ def _matches(left: Grey, right: Grey, horizontal_px: int, vertical_px: int) -> N
     small_left = cv2.resize(left, size, interpolation=cv2.INTER_AREA)
     small_right = cv2.resize(right, size, interpolation=cv2.INTER_AREA)
     corners = cv2.goodFeaturesToTrack(small_left, _PATCHES, 0.01, max(6.0, size[0] / 20.0), blockSize=5)
+    expected, reach = (0, -round(about_vertical_px / _COARSE)), (-(-reach_px[0] // _COARSE), -(-reach_px[1] // _COARSE))
     found = []
     for x, y in np.empty((0, 2)) if corners is None else corners.reshape(-1, 2):
-        coarse = _find(small_left, small_right, round(x), round(y), _COARSE_PATCH_PX,
-                       (0, 0), (-(-horizontal_px // _COARSE), -(-vertical_px // _COARSE)))  # fmt: skip
+        coarse = _find(small_left, small_right, round(x), round(y), _COARSE_PATCH_PX, expected, reach)
         if coarse is None:
             continue
         at = (round(x) * _COARSE + _COARSE // 2, round(y) * _COARSE + _COARSE // 2)

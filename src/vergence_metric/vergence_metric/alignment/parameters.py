@@ -35,7 +35,7 @@ class AlignmentParameters(Parameters):
         formerly="align_roll_deg",
     )
     max_vertical_px: float = parameter(
-        24.0,
+        80.0,
         "align.mode `auto`: largest vertical offset that is removed",
         unit="px",
         minimum=0.0,
@@ -43,7 +43,7 @@ class AlignmentParameters(Parameters):
         formerly="align_max_vertical_px",
     )
     max_roll_rad: float = parameter(
-        math.radians(4.0),
+        math.radians(6.0),
         "align.mode `auto`: largest rotation that is removed",
         unit="rad",
         minimum=0.0,

@@ -73,7 +73,8 @@ class VisualEncoder:
         self._kinematics = Kinematics(rig)
         self._mounts = (rotation_pan_from_camera(rig.left_mount), rotation_pan_from_camera(rig.right_mount))
         servos = (rig.joints.pan_left.servo, rig.joints.pan_right.servo)
-        self._servo_uncertainty_rad = sum(servo.uncertainty_rad for servo in servos)
+        self._servo_uncertainty_rad = sum(servo.uncertainty_rad for servo in servos) + rig.zero_error_rad
+        self._zero_sigma_rad = rig.zero_sigma_rad
         self._pan_sigma_rad = _UNIFORM_TO_SIGMA * max(servo.uncertainty_rad for servo in servos)
 
     @property
@@ -134,7 +135,7 @@ class VisualEncoder:
     def _prior(self, step_rad: float) -> RigPrior:
         return RigPrior(
             vergence_rad=_VERGENCE_SIGMAS * self.max_deviation_rad,
-            pan_rad=math.hypot(self._pan_sigma_rad, 0.5 * self._p.acceptance.mount_tolerance_rad),
+            pan_rad=math.hypot(self._pan_sigma_rad, 0.5 * self._p.acceptance.mount_tolerance_rad, self._zero_sigma_rad),
             focal=self._p.prior.focal_sigma,
             distortion=self._p.prior.distortion_sigma,
             centre_rad=self._p.prior.centre_sigma_px * step_rad,
