@@ -17,6 +17,7 @@ COMMANDS = {
         "vergence_calibration.ros.identify",
         "measure timing and geometry of a running head and write them to YAML",
     ),
+    "fixation": ("vergence_bringup.commands.fixation", "where axes at the paper's angles C1 and C2 meet"),
     "look": ("vergence_bringup.ros.look", "look at a pixel, a class, a point or by angles, and say whether it verged"),
     "watch": ("vergence_bringup.ros.watch", "show a running graph in the terminal"),
     "doctor": ("vergence_bringup.commands.doctor", "check this machine: what is missing, and how to install it"),

@@ -17,6 +17,7 @@ from vergence_common.node_main import StartAbandonedError
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import to_nanoseconds, to_stamp
+from vergence_rig.head_bodies import OPTICAL_FRAMES
 from vergence_rig.parameters import Groups
 from vergence_rig.rig import JOINT_NAMES
 from vergence_sim.clock_parameters import ClockParameters
@@ -215,7 +216,7 @@ class RealTimeNode(Node):
             if self._true_joints.get_subscription_count():
                 self._true_joints.publish(joint_state(stamp, true, true_speeds))
             return
-        header = Header(stamp=stamp, frame_id=f"{event.eye}_camera_optical_frame")
+        header = Header(stamp=stamp, frame_id=OPTICAL_FRAMES[event.eye])
         picture = self._image_pool.submit(world.expose(event.eye))
         info = camera_info(header, world.lenses[event.eye].camera, world.calibrations[event.eye])
         latency_s = world.parameters.camera.latency_s
