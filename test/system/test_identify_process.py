@@ -19,6 +19,7 @@ from sensor_msgs.msg import JointState
 
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup
 from vergence_rig.rig_file import load_rig
+from vergence_sim.printed_head import printed_head
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(400), pytest.mark.usefixtures("opengl")]
 
@@ -31,9 +32,9 @@ def processes(domain_id: int, tmp_path: Path) -> Iterator[ProcessGroup]:
         yield group
 
 
-def start_head(processes: ProcessGroup, *remappings: str) -> None:
+def start_head(processes: ProcessGroup, *remappings: str, **head: Any) -> None:
     # Few frames a second: many tests may share this machine.
-    parameters = {"servo_latency_s": SLOW_S, "camera.frame_rate_hz": 15.0}
+    parameters = {"servo_latency_s": SLOW_S, "camera.frame_rate_hz": 15.0} | head
     processes.start("sim", NodeCommand.of("sim_node", parameters, remappings))
 
 
@@ -64,6 +65,27 @@ def test_a_simulated_heads_latencies_and_gains_are_written(processes: ProcessGro
         assert axis[f"{eye}_eye"]["px_per_rad"] == pytest.approx(539.0, rel=0.06)
     assert rig.pan_left == load_rig("").pan_left
     assert record["eyes"]["left"]["stamp_to_arrival_s"] > 0.044
+
+
+def test_a_printed_heads_geometry_is_found_by_looking(processes: ProcessGroup, tmp_path: Path) -> None:
+    start_head(
+        processes, **{"head.model": "printed", "head.seed": 3, "head.camera_info": "none", "servo_latency_s": 0.015}
+    )
+    out = tmp_path / "rig.yaml"
+    shown, errors = identify(out, "--only", "geometry", "--poses", "24").communicate(timeout=380)
+    assert "wrote" in shown, shown + errors
+    found, truth = load_rig(out).in_eye_angles(), printed_head(3).in_eye_angles()
+    for left in (True, False):
+        assert found.mount(left).lens_x_m == pytest.approx(truth.mount(left).lens_x_m, abs=0.002)
+        assert found.mount(left).lens_y_m == pytest.approx(truth.mount(left).lens_y_m, abs=0.003)
+        assert found.mount(left).roll_rad == pytest.approx(truth.mount(left).roll_rad, abs=math.radians(0.2))
+        assert found.mount(left).pitch_rad == pytest.approx(truth.mount(left).pitch_rad, abs=math.radians(0.2))
+        assert found.camera(left).fx_px == pytest.approx(truth.camera(left).fx_px, rel=0.01)
+        assert found.camera(left).cx_px == pytest.approx(truth.camera(left).cx_px, abs=4)
+    zeros = zip(load_rig(out).eye_angles((0, 0, 0))[:2], printed_head(3).eye_angles((0, 0, 0))[:2], strict=True)
+    assert all(abs(own - true) < math.radians(0.3) for own, true in zeros)
+    record = yaml.safe_load(out.read_text())["identified"]["geometry"]
+    assert record["residual_px"] < 0.5 < 2.0 < record["residual_before_px"]
 
 
 class Inverter(Node):

@@ -15,7 +15,7 @@ from vergence_calibration.geometry.stereo_file import mount_constraint, read_ste
 from vergence_calibration.geometry.unknowns import index
 from vergence_calibration.geometry.views import Observations, Poses
 from vergence_calibration.identification.axis_log import EYES, EyeCamera, IdentifyError
-from vergence_calibration.identification.identified_rig import rig_text
+from vergence_calibration.identification.identified_rig import recorded, rig_text
 from vergence_rig.camera import CameraModel
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import JOINT_NAMES, CameraSpec, EyeMount, Joints, Rig, default_rig
@@ -76,8 +76,8 @@ class Room:
     count: int = 700
 
 
-def sightings(truth: Rig, room: Room, seed: int, poses: int = 36) -> tuple[Observations, Poses]:
-    """Return what a true head with its servos' play sees from the planned poses."""
+def sightings(truth: Rig, room: Room, seed: int, stops_anywhere: bool = False) -> tuple[Observations, Poses]:
+    """Return what a true head sees from the planned poses; its servos stop at the edge, or anywhere, of their play."""
     random = np.random.default_rng([seed, 7])
     azimuth, elevation = random.uniform(-60, 60, room.count) * DEG, random.uniform(-45, 45, room.count) * DEG
     directions = np.column_stack(
@@ -86,12 +86,16 @@ def sightings(truth: Rig, room: Room, seed: int, poses: int = 36) -> tuple[Obser
     points_m = directions * random.uniform(room.nearest_m, room.furthest_m, room.count)[:, None]
     plants = {name: ServoPlant(joint.servo) for name, joint in truth.joints.items()}
     kinematics, start = Kinematics(truth), default_rig()
-    planned = planned_poses(start, PoseParameters(poses=poses))
+    planned = planned_poses(start, PoseParameters())
     view, point, pixels = [], [], []
     for number, pose in enumerate(planned):
         for name, plant in plants.items():
             plant.command(pose[name], float(number))
-        *pans, tilt = truth.eye_angles([plants[name].step(number + 0.9) for name in JOINT_NAMES])
+        shafts = np.array([plants[name].step(number + 0.9) for name in JOINT_NAMES])
+        if stops_anywhere:
+            plays = [truth.joints[name].servo.half_play_rad for name in JOINT_NAMES]
+            shafts = np.array([pose[name] for name in JOINT_NAMES]) + random.uniform(-1, 1, 3) * plays
+        *pans, tilt = truth.eye_angles(shafts.tolist())
         for eye, pan in enumerate(pans):
             left = eye == 0
             rays = (points_m - kinematics.lens(left, pan, tilt)) @ kinematics.rotation_rig_from_camera(left, pan, tilt)
@@ -185,9 +189,24 @@ def test_it_is_written_and_read_back(found_uncalibrated: tuple[FoundGeometry, Ri
     assert record["left"]["lens_x_m"] == pytest.approx(truth.left_mount.lens_x_m, abs=0.001)
     assert 0 < record["left"]["lens_x_m_sigma"] < 0.001
     assert record["right"]["focal_length_px"] == pytest.approx(truth.right_camera.fx_px, rel=0.003)
+    again = rig_text(found.rig, recorded(str(path)) | {"assumption": "stamps"}, "later")
+    assert yaml.safe_load(again)["identified"] == {"geometry": record, "assumption": "stamps", "at": "later"}
+    assert recorded("") == {}
     text = "\n".join(geometry_lines(found))
     assert f"scale {found.of('scale', 'left')[0]:.4f}" in text
     assert "tilt zero" in text
+
+
+def test_servos_that_stop_anywhere_in_their_play_cost_little() -> None:
+    truth = printed_rig(6)
+    seen, poses = sightings(truth, Room(), 6, stops_anywhere=True)
+    found = solved(default_rig(), cameras_of(default_rig()), poses, seen)
+    for name, (error, sigma) in errors(found, truth).items():
+        assert abs(error) < 4 * sigma, (name, error, sigma)
+        allowed = {"zero_rad": 0.2 * DEG, "scale": 0.01, "tilt_scale": 0.01}.get(
+            name.rpartition(".")[2], MOST[name.rpartition(".")[2]]
+        )
+        assert abs(error) < allowed, (name, error)
 
 
 def test_calibrated_cameras_are_kept() -> None:

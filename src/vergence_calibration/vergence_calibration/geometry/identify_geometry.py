@@ -39,8 +39,9 @@ _MOST_SIGMA = {
 }
 """Largest standard deviation of what an eye needs, its factor and unit for a person."""
 _MAY_BE_UNSEEN = (
-    *(f"{eye}.{name}" for eye in EYES for name in ("k1", "k2")),
+    *(f"{eye}.{name}" for eye in EYES for name in ("log_aspect", "k1", "k2", "p1", "p2")),
     "lens_z_apart_m",
+    "axis_x_apart_m",
     "tilt_scale",
     "tilt_axis_x_m",
     "tilt_axis_z_m",

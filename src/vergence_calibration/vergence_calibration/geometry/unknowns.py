@@ -4,7 +4,7 @@ Some quantities cannot be seen, and stay as rig.yaml has them:
 
 - the tilt's zero: without gravity the whole world may be tilted instead;
 - each camera's yaw: yaw and the pan's zero are one angle, of which the zero is estimated;
-- the pan axes' x and z, and the mean of the lenses' heights: only where the lenses stand to the tilt axis can be seen;
+- the pan axes' mean x and heights and the lenses' mean height: only how lenses stand to the tilt axis shows;
 - the baseline, the one length that must be given: images alone have no scale.
 """
 
@@ -29,30 +29,43 @@ EYE_UNKNOWNS = (
     "scale",
     "half_play_rad",
     "log_focal",
+    "log_aspect",
     "cx_px",
     "cy_px",
     "k1",
     "k2",
+    "p1",
+    "p2",
 )
-"""Of each eye; `log_focal` is the logarithm of focal length over the start's, `half_play_rad` half the pan's play."""
+"""Of each eye; `log_focal` is the logarithm of focal length over the start's, `log_aspect` that of fy / fx over the
+start's, `half_play_rad` half the pan's play."""
 
-HEAD_UNKNOWNS = ("lens_z_apart_m", "tilt_scale", "tilt_half_play_rad", "tilt_axis_x_m", "tilt_axis_z_m")
-"""Of both eyes together; `lens_z_apart_m` is the left lens's height above the right one's."""
+HEAD_UNKNOWNS = (
+    "lens_z_apart_m",
+    "axis_x_apart_m",
+    "tilt_scale",
+    "tilt_half_play_rad",
+    "tilt_axis_x_m",
+    "tilt_axis_z_m",
+)
+"""Of both eyes together; `lens_z_apart_m` is the left lens's height above the right one's, `axis_x_apart_m` how far the
+left pan axis stands before the right one."""
 
-CAMERA_UNKNOWNS = ("log_focal", "cx_px", "cy_px", "k1", "k2")
+CAMERA_UNKNOWNS = EYE_UNKNOWNS[EYE_UNKNOWNS.index("log_focal") :]
 
 NAMES = tuple(f"{eye}.{name}" for eye in EYES for name in EYE_UNKNOWNS) + HEAD_UNKNOWNS
 """Every unknown, in the order of all vectors and covariances."""
 
 _DEG = math.pi / 180.0
 _SIGMA_M = 0.03
-_APART_SIGMA_M = 0.005
+_APART_SIGMA_M, _AXES_APART_SIGMA_M = 0.005, 0.002
 _TILT_AXIS_SIGMA_M = 0.05
 _MOUNT_SIGMA_RAD = 4.0 * _DEG
 _ZERO_SIGMA_RAD = 6.0 * _DEG
 _SCALE_SIGMA = 0.05
 _FOCAL_SIGMA = 0.1
 _CENTRE_SHARE = 0.03  # of the image's width
+_ASPECT_SIGMA, _TANGENTIAL_SIGMA = 0.003, 0.001
 _K1_SIGMA, _K2_SIGMA = 0.1, 0.1
 _LEAST_PLAY_SIGMA_RAD = 0.05 * _DEG
 _UNIFORM_TO_SIGMA = 1.0 / math.sqrt(3.0)
@@ -93,13 +106,18 @@ def prior_of(rig: Rig, cameras: Mapping[str, EyeCamera]) -> Prior:
         put("half_play_rad", joint.servo.half_play_rad, _play_sigma(joint), eye)
         model, free = camera.model, 0.0 if camera.calibrated else 1.0
         centre_px = _CENTRE_SHARE * model.width_px
-        k1, k2 = (0.0, 0.0) if camera.calibrated else model.distortion[:2]
+        bent = not camera.calibrated and model.distortion_model == "plumb_bob"
+        k1, k2, p1, p2 = model.distortion[:4] if bent and len(model.distortion) else (0.0,) * 4
         put("log_focal", 0.0, free * _FOCAL_SIGMA, eye)
+        put("log_aspect", 0.0, free * _ASPECT_SIGMA, eye)
         put("cx_px", model.cx_px, free * centre_px, eye)
         put("cy_px", model.cy_px, free * centre_px, eye)
         put("k1", k1, free * _K1_SIGMA, eye)
         put("k2", k2, free * _K2_SIGMA, eye)
+        put("p1", p1, free * _TANGENTIAL_SIGMA, eye)
+        put("p2", p2, free * _TANGENTIAL_SIGMA, eye)
     put("lens_z_apart_m", rig.left_mount.lens_z_m - rig.right_mount.lens_z_m, _APART_SIGMA_M)
+    put("axis_x_apart_m", rig.left_mount.axis_x_m - rig.right_mount.axis_x_m, _AXES_APART_SIGMA_M)
     put("tilt_scale", rig.tilt.scale, _SCALE_SIGMA)
     put("tilt_half_play_rad", rig.tilt.servo.half_play_rad, _play_sigma(rig.tilt))
     put("tilt_axis_x_m", rig.tilt_axis_x_m, _TILT_AXIS_SIGMA_M)
@@ -114,11 +132,12 @@ def _play_sigma(joint: JointSpec) -> float:
 
 def rig_of(rig: Rig, values: Array, cameras: Mapping[str, EyeCamera]) -> Rig:
     """Return the rig with estimated values (G,); plays stay, and so does the camera of rig.yaml of a calibrated eye."""
-    apart_m = values[index("lens_z_apart_m")] - (rig.left_mount.lens_z_m - rig.right_mount.lens_z_m)
+    higher_m = values[index("lens_z_apart_m")] - (rig.left_mount.lens_z_m - rig.right_mount.lens_z_m)
+    ahead_m = values[index("axis_x_apart_m")] - (rig.left_mount.axis_x_m - rig.right_mount.axis_x_m)
     mounts, pans, specs = {}, {}, {}
     for eye, side in zip(EYES, (0.5, -0.5), strict=True):
         found = {name: float(values[index(name, eye)]) for name in EYE_UNKNOWNS}
-        mounts[eye] = _mount(rig.mount(eye == "left"), found, side * float(apart_m))
+        mounts[eye] = _mount(rig.mount(eye == "left"), found, side * float(higher_m), side * float(ahead_m))
         pans[eye] = replace(
             rig.joints[f"pan_{eye}"], zero_rad=round(found["zero_rad"], 6), scale=round(found["scale"], 6)
         )
@@ -137,10 +156,12 @@ def rig_of(rig: Rig, values: Array, cameras: Mapping[str, EyeCamera]) -> Rig:
     )
 
 
-def _mount(mount: EyeMount, found: Mapping[str, float], higher_m: float) -> EyeMount:
+def _mount(mount: EyeMount, found: Mapping[str, float], higher_m: float, ahead_m: float) -> EyeMount:
     names = ("lens_x_m", "lens_y_m", "roll_rad", "pitch_rad")
     return mount.replaced(
-        **{name: round(found[name], 6) for name in names}, lens_z_m=round(mount.lens_z_m + higher_m, 6)
+        **{name: round(found[name], 6) for name in names},
+        lens_z_m=round(mount.lens_z_m + higher_m, 6),
+        axis_x_m=round(mount.axis_x_m + ahead_m, 6),
     )
 
 
@@ -150,8 +171,8 @@ def _camera(camera: EyeCamera, found: Mapping[str, float]) -> CameraSpec:
         width_px=model.width_px,
         height_px=model.height_px,
         fx_px=round(grown * model.fx_px, 2),
-        fy_px=round(grown * model.fy_px, 2),
+        fy_px=round(grown * math.exp(found["log_aspect"]) * model.fy_px, 2),
         cx_px=round(found["cx_px"], 2),
         cy_px=round(found["cy_px"], 2),
-        distortion=(round(found["k1"], 5), round(found["k2"], 5), 0.0, 0.0, 0.0),
+        distortion=(*(round(found[name], 5) for name in ("k1", "k2", "p1", "p2")), 0.0),
     )

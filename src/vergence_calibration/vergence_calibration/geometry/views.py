@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vergence_calibration.geometry.unknowns import EYE_UNKNOWNS, HEAD_UNKNOWNS, NAMES
+from vergence_calibration.geometry.unknowns import CAMERA_UNKNOWNS, EYE_UNKNOWNS, HEAD_UNKNOWNS, NAMES
 from vergence_calibration.identification.axis_log import EYES, EyeCamera
 from vergence_rig.geometry import ROTATION_EYE_FROM_OPTICAL
 from vergence_rig.rig import Rig
@@ -19,6 +19,7 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
 _PER_EYE = len(EYE_UNKNOWNS)
+_CAMERA = _PER_EYE - len(CAMERA_UNKNOWNS)
 LOCAL = _PER_EYE + len(HEAD_UNKNOWNS) + 2
 """Number of unknowns that a view depends on: its eye's, the head's, its pan's and its tilt's deviation at the pose."""
 
@@ -81,7 +82,8 @@ class HeadViews:
         self.count = 2 * len(poses.joints_rad)
         mounts = [rig.mount(eye == "left") for eye in EYES]
         half_m, mean_z_m = 0.5 * rig.baseline_m, 0.5 * (mounts[0].lens_z_m + mounts[1].lens_z_m)
-        self._axes = np.array([(m.axis_x_m, y, m.axis_z_m) for m, y in zip(mounts, (half_m, -half_m), strict=True)])
+        mean_x_m = 0.5 * (mounts[0].axis_x_m + mounts[1].axis_x_m)
+        self._axes = np.array([(mean_x_m, y, m.axis_z_m) for m, y in zip(mounts, (half_m, -half_m), strict=True)])
         self._yaws = np.array([mount.yaw_rad for mount in mounts])
         self._lens_z = mean_z_m
         self._tilt_zero = rig.tilt.zero_rad
@@ -108,7 +110,7 @@ class HeadViews:
         """Return the cameras' poses and their derivatives for a vector of unknowns (G + 3 P,)."""
         local = vector[self.unknowns]
         lens_x, lens_y, roll, pitch, zero, scale, play = local[:, :7].T
-        apart, tilt_scale, tilt_play, tilt_x, tilt_z = local[:, _PER_EYE : _PER_EYE + 5].T
+        higher, ahead, tilt_scale, tilt_play, tilt_x, tilt_z = local[:, _PER_EYE:-2].T
         joints, arrived = self.poses.joints_rad[self._pose], self.poses.arrived[self._pose]
         rows = np.arange(self.count)
         pan_joint = joints[rows, self._eye] - arrived[rows, self._eye] * play + local[:, -2]
@@ -121,8 +123,9 @@ class HeadViews:
         rotations = with_pitch @ _about_x(roll) @ ROTATION_EYE_FROM_OPTICAL
         axis = np.column_stack([tilt_x, np.zeros(self.count), tilt_z])
         side = np.where(self._eye == 0, 0.5, -0.5)
-        pan_axis = axis + np.einsum("vij,vj->vi", bar, self._axes[self._eye] - axis)
-        lens = np.column_stack([lens_x, lens_y, self._lens_z + side * apart])
+        apart = np.column_stack([side * ahead, np.zeros((self.count, 2))])
+        pan_axis = axis + np.einsum("vij,vj->vi", bar, self._axes[self._eye] + apart - axis)
+        lens = np.column_stack([lens_x, lens_y, self._lens_z + side * higher])
         lenses = pan_axis + np.einsum("vij,vj->vi", on_axis, lens)
 
         turns, moves = np.zeros((2, self.count, LOCAL, 3))
@@ -135,13 +138,14 @@ class HeadViews:
             (5, pan_joint, by_pan),
             (6, -arrived[rows, self._eye] * scale, by_pan),
             (LOCAL - 2, scale, by_pan),
-            (_PER_EYE + 1, tilt_joint, by_tilt),
-            (_PER_EYE + 2, -arrived[:, 2] * tilt_scale, by_tilt),
+            (_PER_EYE + 2, tilt_joint, by_tilt),
+            (_PER_EYE + 3, -arrived[:, 2] * tilt_scale, by_tilt),
             (LOCAL - 1, tilt_scale, by_tilt),
         ):
             turns[:, place], moves[:, place] = factor[:, None] * by[0], factor[:, None] * by[1]
         moves[:, _PER_EYE] = side[:, None] * on_axis[:, :, 2]
-        moves[:, _PER_EYE + 3], moves[:, _PER_EYE + 4] = (np.eye(3)[k] - bar[:, :, k] for k in (0, 2))
+        moves[:, _PER_EYE + 1] = side[:, None] * bar[:, :, 0]
+        moves[:, _PER_EYE + 4], moves[:, _PER_EYE + 5] = (np.eye(3)[k] - bar[:, :, k] for k in (0, 2))
         return ViewPoses(rotations, lenses, turns, moves)
 
     def project(self, vector: Array, points: Points, seen: Observations) -> tuple[Array, Array, Array]:
@@ -156,28 +160,35 @@ class HeadViews:
         direction, inverse = points.directions[seen.point], points.inverse_m[seen.point][:, None]
         apart = direction - inverse * lens
         ray = np.einsum("nji,nj->ni", rotation, apart)
-        log_focal, cx, cy, k1, k2 = vector[self.unknowns[seen.view, 7:12]].T
+        log_focal, log_aspect, cx, cy, k1, k2, p1, p2 = vector[self.unknowns[seen.view, _CAMERA:_PER_EYE]].T
         depth = np.where(ray[:, 2] > _LEAST_DEPTH, ray[:, 2], np.nan)
         x, y = ray[:, 0] / depth, ray[:, 1] / depth
         square = x * x + y * y
         bend, slope = 1.0 + square * (k1 + square * k2), 2.0 * (k1 + 2.0 * square * k2)
-        focal = self._focal[eye] * np.exp(log_focal)[:, None]
+        focal = self._focal[eye] * np.exp(np.column_stack([log_focal, log_focal + log_aspect]))
         flat = np.column_stack([x, y])
-        pixels = focal * flat * bend[:, None] + np.column_stack([cx, cy])
+        by_p1, by_p2 = (
+            np.column_stack([2 * x * y, square + 2 * y * y]),
+            np.column_stack([square + 2 * x * x, 2 * x * y]),
+        )
+        bent = flat * bend[:, None] + p1[:, None] * by_p1 + p2[:, None] * by_p2
+        pixels = focal * bent + np.column_stack([cx, cy])
 
         # d pixel / d ray, (N, 2, 3)
-        by_flat = focal[:, :, None] * (
-            bend[:, None, None] * np.eye(2) + slope[:, None, None] * flat[:, :, None] * flat[:, None, :]
-        )
+        both = 2 * p1 * x + 2 * p2 * y
+        tangential = np.stack([2 * p1 * y + 6 * p2 * x, both, both, 6 * p1 * y + 2 * p2 * x], axis=1).reshape(-1, 2, 2)
+        radial = bend[:, None, None] * np.eye(2) + slope[:, None, None] * flat[:, :, None] * flat[:, None, :]
+        by_flat = focal[:, :, None] * (radial + tangential)
         by_ray = np.concatenate([by_flat, -np.einsum("nij,nj->ni", by_flat, flat)[:, :, None]], axis=2)
         by_rig = np.einsum("nij,nkj->nik", by_ray / depth[:, None, None], rotation)
         # A camera turned by w sees v x w; one moved by m sees the point moved by -inverse m.
         shift = np.cross(apart[:, None, :], poses.turns[seen.view]) - inverse[:, :, None] * poses.moves[seen.view]
         by_view = np.einsum("nij,nkj->nik", by_rig, shift)
-        by_view[:, :, 7] = focal * flat * bend[:, None]
-        by_view[:, 0, 8], by_view[:, 1, 9] = 1.0, 1.0
-        by_view[:, :, 10] = focal * flat * square[:, None]
-        by_view[:, :, 11] = focal * flat * (square * square)[:, None]
+        by_view[:, :, _CAMERA], by_view[:, 1, _CAMERA + 1] = focal * bent, (focal * bent)[:, 1]
+        by_view[:, 0, _CAMERA + 2], by_view[:, 1, _CAMERA + 3] = 1.0, 1.0
+        by_view[:, :, _CAMERA + 4] = focal * flat * square[:, None]
+        by_view[:, :, _CAMERA + 5] = focal * flat * (square * square)[:, None]
+        by_view[:, :, _CAMERA + 6], by_view[:, :, _CAMERA + 7] = focal * by_p1, focal * by_p2
         along = tangents(points.directions)[seen.point]
         by_point = np.concatenate(
             [np.einsum("nij,njk->nik", by_rig, along), -np.einsum("nij,nj->ni", by_rig, lens)[:, :, None]], axis=2
@@ -187,8 +198,9 @@ class HeadViews:
     def rays(self, vector: Array, seen: Observations) -> Array:
         """Return unit rays (N, 3) in rig_base of the observed pixels, without lens distortion."""
         poses = self.view_poses(vector)
-        log_focal, cx, cy = vector[self.unknowns[seen.view, 7:10]].T
-        focal = self._focal[self._eye[seen.view]] * np.exp(log_focal)[:, None]
+        log_focal, log_aspect, cx, cy = vector[self.unknowns[seen.view, _CAMERA : _CAMERA + 4]].T
+        scales = np.exp(np.column_stack([log_focal, log_focal + log_aspect]))
+        focal = self._focal[self._eye[seen.view]] * scales
         flat = (seen.pixels - np.column_stack([cx, cy])) / focal
         rays = np.einsum("nij,nj->ni", poses.rotations[seen.view], np.column_stack([flat, np.ones(len(flat))]))
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))

@@ -14,6 +14,7 @@ from vergence_calibration.identification.wiring_faults import cross_talk
 from vergence_rig.parameters import ParameterError
 from vergence_rig.rig import CameraSpec, Joints, JointSpec, Rig
 from vergence_rig.rig_file import rig_as_mapping, rig_from_mapping
+from vergence_rig.yaml_file import read_yaml
 
 _HEAD = "# Written by vergence identify; the old file is kept beside it. Keys: config/rig.yaml, docs/identify.md\n"
 _NODES_HEAD = "# Written by vergence identify, for --params-file after the shipped ones: docs/identify.md\n"
@@ -66,7 +67,7 @@ def _camera(eye: str, spec: CameraSpec, found: Identification) -> CameraSpec:
 
 def rig_text(rig: Rig, found: Mapping[str, Any], when: str) -> str:
     """Return rig.yaml for an identified rig, with the record of what was found. `when` is the time in words."""
-    document = rig_as_mapping(rig) | {"identified": {"at": when, **found}}
+    document = rig_as_mapping(rig) | {"identified": {**found, "at": when}}
     assert rig_from_mapping(document) == rig  # the file reads back as the same rig
     return _HEAD + yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120)
 
@@ -74,6 +75,13 @@ def rig_text(rig: Rig, found: Mapping[str, Any], when: str) -> str:
 def nodes_text(document: dict[str, Any]) -> str:
     """Return a ROS parameter file."""
     return _NODES_HEAD + yaml.safe_dump(document, sort_keys=False, default_flow_style=False)
+
+
+def recorded(path: str) -> dict[str, Any]:
+    """Return the record that a rig file has of an earlier identification; empty for none, or for no path."""
+    document = read_yaml(path) if path else {}
+    found = document.get("identified") if isinstance(document, Mapping) else None
+    return dict(found) if isinstance(found, Mapping) else {}
 
 
 def record(found: Identification) -> dict[str, Any]:

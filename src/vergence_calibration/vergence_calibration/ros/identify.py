@@ -16,7 +16,7 @@ from vergence_calibration.geometry.poses import PoseParameters
 from vergence_calibration.geometry.stereo_file import mount_constraint, read_stereo
 from vergence_calibration.identification.axis_log import IdentifyError, IdentifyParameters
 from vergence_calibration.identification.identification import Identification, identify
-from vergence_calibration.identification.identified_rig import identified_rig, nodes_text, record, rig_text
+from vergence_calibration.identification.identified_rig import identified_rig, nodes_text, record, recorded, rig_text
 from vergence_calibration.identification.latencies import ASSUMPTIONS, Estimate
 from vergence_calibration.identification.node_parameters import node_parameters
 from vergence_calibration.ros.identified_head import TRANSPORTS, IdentifiedHead
@@ -115,7 +115,7 @@ def _identify(options: argparse.Namespace) -> int:
         finally:
             _ignore_signals()
     _raise_on_signals()
-    records: dict[str, Any] = {}
+    records = recorded(options.rig)
     changes: dict[str, Any] = {}
     if found is not None:
         _print_latencies(found)
@@ -133,8 +133,7 @@ def _identify(options: argparse.Namespace) -> int:
 def _stereo(options: argparse.Namespace) -> tuple[Constraint, ...]:
     """Return the constraint of stereo.yaml: the named one, or the one beside --rig. Raises IdentifyError."""
     path: Path | None = options.stereo
-    beside = Path(options.rig).with_name("stereo.yaml")
-    if path is None and options.rig and beside.exists():
+    if path is None and options.rig and (beside := Path(options.rig).with_name("stereo.yaml")).exists():
         path = beside
     if path is None or options.only == _TIMING:
         return ()

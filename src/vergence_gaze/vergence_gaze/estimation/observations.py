@@ -104,7 +104,9 @@ class EdgeContrast:
 class EyeRotationObservation:
     """The cameras' true vergence [rad] in a pair, from background features, with its standard deviation.
 
-    `usable` is False where the visual encoder has no reading; `reason` says why.
+    `usable` is False where the visual encoder has no reading; `reason` says why. `contradictory` says that the reading
+    differs from the joints by more than servos and mounts can. Roll and pitch are of the right eye against the left
+    one, beyond those of rig.yaml [rad].
     """
 
     stamp_s: float
@@ -113,6 +115,9 @@ class EyeRotationObservation:
     sigma_rad: float
     usable: bool = True
     reason: str = ""
+    contradictory: bool = False
+    roll_rad: float = math.nan
+    pitch_rad: float = math.nan
 
 
 Observation: TypeAlias = (

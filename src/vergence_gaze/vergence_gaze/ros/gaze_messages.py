@@ -131,6 +131,7 @@ def edge_contrast(message: EdgeVergence) -> EdgeContrast:
 
 def eye_rotation(message: EyeRotation) -> EyeRotationObservation:
     """Return the visual encoder's reading."""
+    _, right_roll, right_pitch, _, left_roll = message.corrections_rad
     return EyeRotationObservation(
         stamp_s=to_seconds(message.header.stamp),
         skew_s=message.pair_skew_s,
@@ -138,6 +139,9 @@ def eye_rotation(message: EyeRotation) -> EyeRotationObservation:
         sigma_rad=message.sigma_rad,
         usable=message.status == EyeRotation.STATUS_OK,
         reason=message.reason,
+        contradictory=message.status == EyeRotation.STATUS_CONTRADICTORY,
+        roll_rad=float(right_roll - left_roll),
+        pitch_rad=float(right_pitch),
     )
 
 

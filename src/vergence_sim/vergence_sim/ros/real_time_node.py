@@ -59,7 +59,7 @@ class RealTimeNode(Node):
         self._published = dict.fromkeys(EYES, 0)
         self._reported_speeds, self._true_speeds = JointSpeeds(), JointSpeeds()
         self._dropped = 0
-        self._refused: list[str] = []
+        self._refused, self._refusal = 0, ""
         self._stop = threading.Event()
         self._started = threading.Event()
         self._failure: BaseException | None = None
@@ -114,7 +114,7 @@ class RealTimeNode(Node):
         self._add_action(lambda world, _: action(world))
 
     def _refuse(self, reason: str) -> None:
-        self._refused.append(reason)
+        self._refused, self._refusal = self._refused + 1, reason
         self.get_logger().warning(f"command refused, nothing moves: {reason}", throttle_duration_sec=1.0)
 
     def _add_action(self, action: Callable[[Any, float], None]) -> None:
@@ -249,8 +249,8 @@ class RealTimeNode(Node):
 
     def _report_commands(self) -> Report:
         if self._refused:
-            values = {"refused": len(self._refused), "joints": ", ".join(JOINT_NAMES)}
-            return Report(WARN, f"{len(self._refused)} commands refused, the last: {self._refused[-1]}", values)
+            values = {"refused": self._refused, "joints": ", ".join(JOINT_NAMES)}
+            return Report(WARN, f"{self._refused} commands refused, the last: {self._refusal}", values)
         return Report(OK, "no command refused")
 
 
