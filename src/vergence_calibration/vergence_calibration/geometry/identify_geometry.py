@@ -16,7 +16,7 @@ from vergence_calibration.geometry.unknowns import NAMES, Prior, index, prior_of
 from vergence_calibration.geometry.views import HeadViews, Observations, Poses
 from vergence_calibration.identification.axis_log import EYES, EyeCamera, IdentifyError
 from vergence_rig.camera import CameraModel
-from vergence_rig.rig import Rig
+from vergence_rig.rig import JOINT_NAMES, Rig
 
 Array = npt.NDArray[np.float64]
 
@@ -25,6 +25,8 @@ _LEAST_FEATURES, _LEAST_POINTS, _LEAST_SHARED = 80, 150, 60
 _LEAST_IN_VIEW, _LEAST_VIEWS_SHARE = 12, 0.7
 _AGREES, _LEAST_AGREEING = 0.2, 0.5
 _LEARNT = 0.7  # of the prior's standard deviation: what remains more uncertain was not seen
+_MOST_DEVIATION = 3.0  # of a joint at rest from joint_states, in its standard deviations
+_SCALES = (0.5, 2.0)
 _DEG = math.pi / 180.0
 _MOST_SIGMA = {
     "lens_x_m": (0.004, 1e3, "mm"),
@@ -154,6 +156,7 @@ def solved(
         held = replace(prior, sigmas=np.where(np.isin(NAMES, kept), 0.0, prior.sigmas))
         adjustment = BundleAdjustment(views, seen, held, constraints)
         solution = adjustment.solve(*adjustment.start())
+    _check_joints(prior, solution)
     sigmas = np.sqrt(np.diag(solution.covariance))
     _check_certain(sigmas)
     return FoundGeometry(
@@ -249,6 +252,25 @@ def _check_sightings(seen: Observations, views: int) -> None:
             f"both eyes must see {_LEAST_SHARED} or more of the same things for the geometry: got {shared}; do both "
             "look the same way, and is neither covered?"
         )
+
+
+def _check_joints(prior: Prior, solution: Solution) -> None:
+    """Raise IdentifyError where a joint did not turn as joint_states say, play and scale apart."""
+    scales = [solution.vector[index("scale", eye)] for eye in EYES] + [solution.vector[index("tilt_scale")]]
+    deviations = solution.vector[len(NAMES) :].reshape(-1, len(JOINT_NAMES))
+    spreads = np.sqrt(np.mean(deviations**2, axis=0))
+    for name, scale, spread, sigma in zip(JOINT_NAMES, scales, spreads, prior.joint_sigma_rad, strict=True):
+        if spread > _MOST_DEVIATION * sigma:
+            raise IdentifyError(
+                f"{name} must turn as joint_states say, to {_MOST_DEVIATION * sigma / _DEG:.2f} degrees by its servo's "
+                f"play: got {spread / _DEG:.2f} degrees; are the servos or the cameras swapped, or is a servo loose? "
+                "`vergence identify --only timing` checks the wiring"
+            )
+        if not _SCALES[0] <= scale <= _SCALES[1]:
+            raise IdentifyError(
+                f"{name} must turn by {_SCALES[0]:g} to {_SCALES[1]:g} times what joint_states say: got {scale:.2f}; "
+                "does it turn the wrong way? `vergence identify --only timing` checks the wiring"
+            )
 
 
 def _check_certain(sigmas: Array) -> None:
