@@ -16,6 +16,7 @@ from bench import gaze_scenarios as scenarios
 from bench.gaze_figures import STEADY_FROM_S, StaticFigures, onset_s, quantile, steady_error_deg
 from bench.gaze_graph_head import SERVO, TARGET, ProcessHead, open_head
 from bench.gaze_runs import Realism, Scenario, Setting, Trace
+from bench.heads import joints_of
 from bench.results import Row
 from vergence_bringup.ros.simulated_head import BOX_RATE_HZ, FRAME_RATE_HZ
 
@@ -127,7 +128,7 @@ def in_the_open(chosen: list[Scenario]) -> list[Scenario]:
     for scenario in chosen:
         point = scenario.target(0.0)
         simulator.place_target(TARGET, point)
-        simulator.set_head(scenarios.fixating(point))
+        simulator.set_head(joints_of(simulator.head.real, scenarios.fixating(point)))
         truth = simulator.truth()
         if min(truth.left_visible_share, truth.right_visible_share) > 0.99:
             seen.append(scenario)

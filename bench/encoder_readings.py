@@ -9,13 +9,14 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from bench.heads import simulated
+from bench.heads import joints_of
 from vergence_gaze.estimation.observations import EyeRotationObservation
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_metric.eye_rotation.encoder import EyeRotationReading as Reading
 from vergence_metric.eye_rotation.encoder import VisualEncoder
 from vergence_metric.eye_rotation.parameters import EncoderParameters, RestParameters
 from vergence_metric.eye_rotation.relative_rotation import RigPrior, relative_rotation
+from vergence_metric.pairs.ideal_images import IdealImages
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, rotation_rig_from_eye
 from vergence_rig.rig import JOINT_NAMES, Rig
@@ -59,6 +60,11 @@ class RestCounter:
         return same
 
 
+def reported_eyes_rad(head: FakeHead) -> Array:
+    """Return the angles of the eyes (3,) that a head's reported joints stand for, by its description."""
+    return np.array(head.rig.eye_angles([head.reported_rad[name] for name in JOINT_NAMES]))
+
+
 class DrawnFeatures:
     """The encoder's readings of features of a room that are drawn about the head; one object for one run."""
 
@@ -74,7 +80,7 @@ class DrawnFeatures:
         if not self._rest.update(head) or self._rest.times > READINGS_PER_REST:
             return None
         focal_px = head.rig.left_camera.fx_px
-        angles = np.array([head.reported_rad[name] for name in JOINT_NAMES])
+        angles = reported_eyes_rad(head)
         # One pose has one set of features, whose errors last; a frame adds little of its own.
         lasting = np.random.default_rng([self._seed, *(np.abs(angles) * 1e6).astype(int).tolist()])
         passing = np.random.default_rng([self._seed, round(head.time_s * 1e4) + 10**6])
@@ -110,8 +116,9 @@ class RenderedRooms:
     """The encoder on what a camera in a rendered room sees; the room stays, `begin` places the target of a run."""
 
     def __init__(self, rig: Rig, parameters: SimParameters) -> None:
-        self._simulator = Simulator(parameters, rig, head=simulated(rig))
+        self._simulator = Simulator(parameters, rig)
         self._encoder = VisualEncoder(PARAMETERS, rig)
+        self._images = IdealImages(rig)
         self._models = [CameraModel(self._simulator.lenses[eye].camera) for eye in ("left", "right")]
         self.readings: list[Reading] = []
         """Every reading since the start, accepted or not."""
@@ -121,7 +128,10 @@ class RenderedRooms:
     def begin(self, point_m: Array, seed: int) -> None:
         """Put a target somewhere for a run that begins now, with cameras that are miscalibrated anew."""
         random = np.random.default_rng([seed, 2])
-        self._cameras = (miscalibrated(self._models[0], random), miscalibrated(self._models[1], random))
+        eyes = self._images.set_cameras(
+            (miscalibrated(self._models[0], random), miscalibrated(self._models[1], random))
+        )
+        self._ideal = eyes[0].ideal, eyes[1].ideal
         self._simulator.place_target("cube", point_m)
         self._rest = RestCounter()
 
@@ -129,10 +139,11 @@ class RenderedRooms:
         """Return what is read of the head as it stands, None while it moves or has been read often enough."""
         if not self._rest.update(head) or self._rest.times > READINGS_PER_REST:
             return None
-        self._simulator.set_head(dict(zip(JOINT_NAMES, head.true_rad.tolist(), strict=True)))
+        real = self._simulator.head.real
+        self._simulator.set_head(joints_of(real, dict(zip(JOINT_NAMES, head.true_rad.tolist(), strict=True))))
         pair = self._simulator.capture()
-        eyes = EyeAngles(*(head.reported_rad[name] for name in JOINT_NAMES))
-        reading = self._encoder.measure(pair.left, pair.right, eyes, self._cameras)
+        eyes = EyeAngles(*reported_eyes_rad(head).tolist())
+        reading = self._encoder.measure(*self._images.draw(pair.left, pair.right), eyes, self._ideal)
         self.readings.append(reading)
         if not reading.ok or reading.rotation is None:
             return EyeRotationObservation(head.time_s, 0.0, math.nan, math.nan, usable=False, reason=reading.reason)

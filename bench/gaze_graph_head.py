@@ -10,17 +10,18 @@ import numpy.typing as npt
 from sensor_msgs.msg import JointState
 
 from bench.gaze_runs import Scenario, Trace, travel_s
+from bench.heads import simulated
 from bench.results import OUT_DIR
 from vergence_bringup.demo.ros.recorder import Recorder, Stamped
 from vergence_bringup.demo.ros.stage import RoomStage, class_goal
-from vergence_bringup.ros.processes import ProcessGroup, config_dir
+from vergence_bringup.ros.processes import ProcessGroup
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
 from vergence_common.stamps import to_seconds
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence
-from vergence_rig.rig import JOINT_NAMES, Rig
-from vergence_rig.rig_file import load_rig
+from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
+from vergence_rig.rig_file import write_rig
 
 Array = npt.NDArray[np.float64]
 Point = Sequence[float] | Array
@@ -119,7 +120,7 @@ class ProcessHead:
         recorder = self._recorder
         states = [e for e in recorder.states if 0.0 <= e.arrival_s - began_s <= duration_s]
         time_s = np.array([entry.arrival_s - began_s for entry in states])
-        joints = _at(time_s, began_s, self._joints, _joints_of)
+        joints = _at(time_s, began_s, self._joints, lambda message: self._rig.eye_angles(_joints_of(message)))
         wanted = _at(time_s, began_s, recorder.truths, _wanted_of)
         pans_left, pans_right, tilts = joints.T
         errors = wanted - np.column_stack([0.5 * (pans_left + pans_right), pans_right - pans_left, tilts])
@@ -146,7 +147,9 @@ class ProcessHead:
 @contextlib.contextmanager
 def open_head() -> Iterator[ProcessHead]:
     """Start a head of its own DDS domain and end it."""
-    path = config_dir() / "rig.yaml"
+    rig = simulated(default_rig())
+    path = OUT_DIR / "gaze_graph_rig.yaml"
+    write_rig(path, rig)
     with (
         own_domain() as domain,
         ProcessGroup(OUT_DIR / "gaze_graph_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes,
@@ -155,7 +158,7 @@ def open_head() -> Iterator[ProcessHead]:
             nodes.start(name, command)
         recorder = Recorder(domain)
         try:
-            yield ProcessHead(recorder, nodes, load_rig(path))
+            yield ProcessHead(recorder, nodes, rig)
         finally:
             recorder.close()
 

@@ -10,14 +10,16 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from bench.heads import described, simulated
+from bench.heads import joints_of, simulated
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import BoxSighting, EyeRotationObservation, Observation
 from vergence_gaze.goals.goal import Goal, GoalKind
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.phases import Phase
 from vergence_gaze.testing.fake_head import TICK_S, FakeHead, VisionModel
-from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
+from vergence_rig.camera import CameraModel
+from vergence_rig.eye_image import eye_images
+from vergence_rig.rig import Rig, default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
@@ -40,7 +42,7 @@ def tolerance_deg(servo: str) -> float:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A target (seconds to (3,) [m]), where the eyes begin, how long, and how the target is given.
+    """A target (seconds to (3,) [m]), the eyes' angles at the start, how long, and how the target is given.
 
     `given` is "pairs", stereo pixel pairs at frame rate; "boxes", the detector's alone; "class", those and the tracker;
     "click" or "two_clicks", one pixel or one pair of them and then the tracker.
@@ -156,23 +158,26 @@ def seeing_of(scenario: Scenario, setting: Setting, realism: Realism, random: np
 def world() -> Simulator:
     """One world serves every run: only where its hinges are set matters, and that is set anew at every look."""
     rig = default_rig()
-    return Simulator(SimParameters(), rig, render=False, head=simulated(rig))
+    return Simulator(SimParameters(), rig, render=False)
 
 
 class SimulatedHead(FakeHead):
     """The fake head with the lockstep simulator's kinematics and mounts: what is seen and true comes from MuJoCo."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         self._simulator = world()
+        self.built = self._simulator.head.real
+        super().__post_init__()
+        cameras = CameraModel(self.built.left_camera), CameraModel(self.built.right_camera)
+        self._images = eye_images(self.rig, cameras)
         self._posed_at = math.nan
 
     def project(self, point_m: Array, left: bool) -> Array:
-        """Return normalised image coordinates (2,) of a point, by the simulator's cameras as they are mounted."""
+        """Return normalised coordinates (2,) of a point in an eye's ideal image, by the simulator's mounted cameras."""
         self._pose()
-        camera = self.rig.left_camera if left else self.rig.right_camera
-        x, y = self._simulator.project("left" if left else "right", point_m)
-        return np.array([(x - camera.cx_px) / camera.fx_px, (y - camera.cy_px) / camera.fy_px])
+        eye = "left" if left else "right"
+        pixel = self._simulator.lenses[eye].distorted(self._simulator.project(eye, point_m))
+        return np.asarray(self._images[not left].undistort(pixel))[0]
 
     def true_errors_rad(self) -> Array:
         """Return (version, vergence, tilt) to the target minus the true ones (3,), by the simulator."""
@@ -182,7 +187,7 @@ class SimulatedHead(FakeHead):
 
     def _pose(self) -> None:
         if self._posed_at != self.time_s:
-            self._simulator.set_head(dict(zip(JOINT_NAMES, self.true_rad.tolist(), strict=True)))
+            self._simulator.set_head({name: plant.true_rad for name, plant in self._plants.items()})
             self._posed_at = self.time_s
 
 
@@ -196,13 +201,13 @@ def run(
     realism = Realism() if realism is None else realism
     random = np.random.default_rng(scenario.seed + 7919)
     servo = SERVOS[setting.servo]
-    rig: Rig = described(default_rig()).with_servos(servo)
+    rig: Rig = simulated(default_rig()).with_servos(servo)
     head = SimulatedHead(
         rig,
         scenario.target,
         seeing_of(scenario, setting, realism, random),
         scenario.seed,
-        scenario.start_rad,
+        joints_of(rig, scenario.start_rad),
         lambda time_s: time_s >= 0.0 and scenario.visible(time_s),
         scenario.mistaken,
         {name: real_servo(servo, realism.servo_spread, random) for name, _ in rig.joints.items()},
@@ -293,7 +298,7 @@ def travel_s(errors_rad: Array, rig: Rig) -> float:
     """Return how long the servos need at full speed, all at once, over errors of version, vergence and tilt (3,)."""
     version, vergence, tilt = errors_rad
     ways = np.abs([version - 0.5 * vergence, version + 0.5 * vergence, tilt])
-    speeds = np.array([joint.servo.speed_rad_s for _, joint in rig.joints.items()])
+    speeds = np.array([joint.scale * joint.servo.speed_rad_s for _, joint in rig.joints.items()])
     return float((ways / speeds).max())
 
 

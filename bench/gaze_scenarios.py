@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.gaze_runs import Encoder, Scenario
+from bench.heads import kinematics
+from vergence_rig.kinematics import Kinematics
 
 Array = npt.NDArray[np.float64]
 
-BASELINE_M = 0.065
 CROSSED_S = 2.5
 _HALF_FIELD_RAD = (math.atan(290.0 / 539.0), math.atan(210.0 / 539.0))
 
@@ -28,20 +29,15 @@ def still(point_m: Array) -> Callable[[float], Array]:
     return lambda time_s: point_m
 
 
-def pans(point_m: Array) -> tuple[float, float, float]:
-    """Return pan_left, pan_right, tilt that fixate a point."""
-    x, y, z = point_m
-    forward = math.hypot(x, z)
-    return (
-        math.atan2(y - 0.5 * BASELINE_M, forward),
-        math.atan2(y + 0.5 * BASELINE_M, forward),
-        math.atan2(-z, x),
-    )
+def pans(point_m: Array, head: Kinematics | None = None) -> tuple[float, float, float]:
+    """Return pan_left, pan_right, tilt of the eyes that fixate a point; of the default simulated head if none."""
+    eyes = (head or kinematics()).gaze_for_point(point_m)
+    return eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad
 
 
-def in_view_start(point_m: Array, random: np.random.Generator) -> dict[str, float]:
-    """Return a random pose from which both eyes see the point."""
-    left, right, tilt = pans(point_m)
+def in_view_start(point_m: Array, random: np.random.Generator, head: Kinematics | None = None) -> dict[str, float]:
+    """Return a random pose of the eyes from which both see the point; of the default simulated head if none."""
+    left, right, tilt = pans(point_m, head)
     while True:
         version, vergence = random.uniform(-0.6, 0.6), random.uniform(0.01, 0.25)
         pose = {
@@ -59,7 +55,7 @@ def in_view_start(point_m: Array, random: np.random.Generator) -> dict[str, floa
 
 
 def fixating(point_m: Array) -> dict[str, float]:
-    """Return the pose that fixates a point."""
+    """Return the pose of the eyes that fixates a point."""
     return dict(zip(("pan_left", "pan_right", "tilt"), pans(point_m), strict=True))
 
 

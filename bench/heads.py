@@ -1,6 +1,11 @@
-"""The head of the closed-loop benchmarks, and the rig that metric and controller are given of it."""
+"""The head of the closed-loop benchmarks: metric and controller are given its own description, as if identified."""
 
-from vergence_rig.rig import Rig
+from collections.abc import Mapping
+from functools import lru_cache
+
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.kinematics import Kinematics
+from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
 from vergence_sim.heads import HeadParameters, simulated_head
 
 
@@ -9,6 +14,14 @@ def simulated(rig: Rig) -> Rig:
     return simulated_head(HeadParameters(), rig)
 
 
-def described(rig: Rig) -> Rig:
-    """Return what the graph is given: a printed head is identified, another one is taken to be `rig`."""
-    return simulated(rig) if HeadParameters().model == "printed" else rig
+@lru_cache(maxsize=1)
+def kinematics() -> Kinematics:
+    """Return the kinematics of the default simulated head."""
+    return Kinematics(simulated(default_rig()))
+
+
+def joints_of(head: Rig, eyes_rad: EyeAngles | Mapping[str, float]) -> dict[str, float]:
+    """Return the joints [rad] by name at which a head's eyes stand at angles, given as EyeAngles or by name."""
+    named = eyes_rad.as_dict() if isinstance(eyes_rad, EyeAngles) else eyes_rad
+    joints = head.joint_angles([named[name] for name in JOINT_NAMES])
+    return dict(zip(JOINT_NAMES, joints, strict=True))

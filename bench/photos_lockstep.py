@@ -200,10 +200,16 @@ class Lockstep:
         self.on_step(command)
 
 
-def record(lockstep: Lockstep, point: Clickable, duration_s: float, rest_s: float) -> Trace:
+def record(
+    lockstep: Lockstep,
+    point: Clickable,
+    duration_s: float,
+    rest_s: float,
+    also: Callable[[Any], None] = lambda command: None,
+) -> Trace:
     """Click on a point as the left eye sees it now and follow what happens; the trace ends after `duration_s`.
 
-    It ends before that once `verged` has stood for `rest_s`.
+    It ends before that once `verged` has stood for `rest_s`. `also` is called with every command too.
     """
     world, trace = lockstep.world, Trace()
     began_s = world.time_s
@@ -222,6 +228,7 @@ def record(lockstep: Lockstep, point: Clickable, duration_s: float, rest_s: floa
         trace.verged.append(bool(report.verged))
         trace.phase.append(report.phase.name.lower())
         trace.reason.append(report.reason)
+        also(command)
         verged_since_s = min(verged_since_s, now_s) if report.verged else math.inf
 
     lockstep.click(point.left_pixel())

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.gaze_scenarios import in_view_start, place
+from bench.heads import joints_of, simulated
 from bench.photos_lockstep import Lockstep, record
 from bench.photos_trials import AWAKE_S
 from bench.photos_verdict import DURATION_S, REST_S, Verdict, verdict_of
@@ -100,11 +101,12 @@ def trials() -> list[SceneTrial]:
 def run(trial: SceneTrial) -> SceneOutcome:
     """Run a trial."""
     cv2.setNumThreads(1)
-    rig, random = default_rig(), np.random.default_rng([trial.seed, 32])
-    with closing(Simulator(SimParameters.of({"seed": trial.seed, "world.seed": trial.room}), rig)) as simulator:
+    rig, random = simulated(default_rig()), np.random.default_rng([trial.seed, 32])
+    parameters = SimParameters.of({"seed": trial.seed, "world.seed": trial.room})
+    with closing(Simulator(parameters, rig, head=rig)) as simulator:
         simulator.place_target(trial.thing, trial.centre_m)
         point_m = np.asarray(simulator.truth().target_point_m, np.float64)
-        settle(simulator, in_view_start(point_m, random), random)
+        settle(simulator, joints_of(rig, in_view_start(point_m, random)), random)
         lockstep = Lockstep(simulator, rig)
         moment_s = float(random.uniform(0.0, 1.0 / simulator.parameters.camera.frame_rate_hz))
         lockstep.advance_to(simulator.time_s + AWAKE_S + moment_s)

@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from bench.heads import described, simulated
+from bench.heads import joints_of, simulated
 from bench.photos_data import VIEW_PX, Target, pair_of, photographs_rig
 from bench.photos_lockstep import Lockstep, Trace, record
 from bench.photos_verdict import DURATION_S, REST_S, Verdict, verdict_of
@@ -110,9 +110,8 @@ def trace_of(trial: Trial, make_lockstep: Callable[[PhotoWorld, Rig], Lockstep] 
     values = {"seed": trial.seed}
     parameters = SimParameters.of(values) if trial.imperfect else SimParameters.ideal(values)
     ideal = parameters.head.model == "ideal"
-    rig = base if ideal else cropped(described(base), *VIEW_PX)
-    built = ideal_head(base) if ideal else cropped(simulated(base), *VIEW_PX)
-    head = head_of(built, random, pair.fixation(point).vergence_rad)
+    rig = ideal_head(base) if ideal else cropped(simulated(base), *VIEW_PX)
+    head = head_of(rig, random, pair.fixation(point).vergence_rad)
     world = PhotoWorld(pair, parameters, rig, head)
     aside = {
         name: float(random.uniform(-0.5, 0.5)) * (joint.servo.dead_band_rad + joint.servo.backlash_rad)
@@ -147,8 +146,7 @@ def start_of(world: PhotoWorld, pair: PhotoPair, point: PhotoPoint) -> dict[str,
     camera = head.left_camera
     off_px = max(abs(camera.cx_px - 0.5 * (camera.width_px - 1)), abs(camera.cy_px - 0.5 * (camera.height_px - 1)))
     eyes = pair.start_towards(point, camera, _IN_VIEW_PX + off_px, head.mean_pitch_rad)
-    joints = head.joint_angles((eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad))
-    return dict(zip(JOINT_NAMES, joints, strict=True))
+    return joints_of(head, eyes)
 
 
 def outcome_of(trial: Trial, trace: Trace, rig: Rig, outside_share: float) -> Outcome:

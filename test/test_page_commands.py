@@ -38,7 +38,21 @@ APT = {
 """Packages that Ubuntu 24.04 or ROS's own repository have; there is no pigpio, and no pigpiod."""
 OF_THE_SYSTEM = {
     *("cd", "chronyc", "cp", "echo", "export", "git", "groups", "groupadd", "i2cdetect", "journalctl", "ls", "mkdir"),
-    *("nano", "printf", "reboot", "rosdep", "source", "sudo", "systemctl", "tee", "touch", "ufw", "usermod", "colcon"),
+    *(
+        "nano",
+        "printf",
+        "reboot",
+        "rosdep",
+        "rviz2",
+        "source",
+        "sudo",
+        "systemctl",
+        "tee",
+        "touch",
+        "ufw",
+        "usermod",
+        "colcon",
+    ),
 }
 """Commands that the pages may use without a check of their own."""
 ROS2 = {"action", "bag", "launch", "param", "pkg", "run", "topic"}

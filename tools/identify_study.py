@@ -48,7 +48,8 @@ class LockstepHead:
     """The simulated head, in the time of its own events."""
 
     def __init__(self, case: Case) -> None:
-        self.simulator = Simulator(case.parameters)
+        # The timing does not depend on the head, only on its servos and cameras.
+        self.simulator = Simulator(case.parameters.replaced({"head.model": "rolled"}))
         self._schedule = Schedule(self.simulator.parameters, 0.0)
         self._late_s = dict(zip(EYES, case.stamps_late_s, strict=True))
         self._now_s = 0.0

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Header
 
@@ -17,7 +18,7 @@ from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_metric.boxes import DetectorError
 from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.ros.box_metric_node import BoxMetricNode
-from vergence_msgs.msg import BoxVergence, StereoDetections
+from vergence_msgs.msg import BoxVergence, DetectorClasses, StereoDetections
 from vergence_rig.parameters import RenamedParameterError
 from vergence_rig.rig import default_rig
 
@@ -125,6 +126,12 @@ def answer(graph: Any, node: BoxMetricNode, eyes: Eyes, left: Any, right: Any) -
     assert eyes.show(left, right) == stamp_ns
     message: BoxVergence = graph.wait(future)
     return message
+
+
+def test_the_classes_are_published_to_whoever_comes_later(graph: Any, node: BoxMetricNode) -> None:
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    future = graph.message(DetectorClasses, "vergence/detector_classes", qos=latched)
+    assert graph.wait(future).names == ["square"]
 
 
 def test_a_pair_gives_metric_ii_with_the_left_stamp(graph: Any, node: BoxMetricNode) -> None:

@@ -195,7 +195,7 @@ def broken(message: Image, **changes: Any) -> Image:
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"encoding": "yuv422"}, "got 'yuv422'"),
+        ({"encoding": "32FC1"}, "got '32FC1'"),
         ({"height": 241}, "data must have 231360 bytes (241 rows of 960): got 230400"),
         ({"step": 100}, "got 100"),
         ({"width": 0}, "size must be at least 1x1: got 0x240"),

@@ -26,7 +26,7 @@ from vergence_gaze.estimation.observations import EdgeContrast, JointReport, Tra
 from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import EdgeVergence, GazeState, TargetTrack, TrackRequest
+from vergence_msgs.msg import DetectorClasses, EdgeVergence, GazeState, TargetTrack, TrackRequest
 from vergence_rig.rig import JOINT_NAMES, default_rig
 
 pytestmark = pytest.mark.graph
@@ -238,6 +238,27 @@ def test_goals_that_cannot_be_say_why(scene: Scene) -> None:
     assert result.result == LookAt.Result.INVALID
     assert "moon" in result.reason
     assert scene.result(scene.send(LookAt.Goal(kind=99))).result == LookAt.Result.INVALID
+
+
+@pytest.mark.parametrize("limit_s", [600.5, 1e9, -1.0, math.inf, math.nan])
+def test_a_time_limit_without_bounds_is_refused(scene: Scene, limit_s: float) -> None:
+    result = scene.result(scene.send(scene.pixel_goal(time_limit_s=limit_s)))
+    assert result.result == LookAt.Result.INVALID
+    assert result.reason == f"time_limit_s must be 0 (default) to 600 [s]: got {limit_s!r}"
+
+
+def test_a_class_that_the_detector_does_not_look_for_is_refused_at_once(scene: Scene) -> None:
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    detector = scene.client.create_publisher(DetectorClasses, "vergence/detector_classes", latched)
+    detector.publish(DetectorClasses(names=["ball", "cube", "cup"]))
+    scene.until(lambda: scene.node._look_at.classes is not None, "the classes are known")
+    result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cub", time_limit_s=ENDLESS_S)))
+    assert result.result == LookAt.Result.INVALID
+    assert result.reason == "class_name must be one that the detector looks for (cube, ball, cup): got 'cub'"
+    handle = scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cube", time_limit_s=ENDLESS_S))
+    scene.until(lambda: scene.states[-1].phase == GazeState.PHASE_SEARCH, "the class is searched for")
+    scene.cancel(handle)
+    assert scene.result(handle).result == LookAt.Result.CANCELLED
 
 
 def test_angles_are_reached_exactly(scene: Scene) -> None:

@@ -7,7 +7,9 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from rcl_interfaces.srv import GetParameters, SetParameters
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -103,6 +105,22 @@ def _restored(name: str, value: Any) -> Any:
     message = _message(name, 0)
     message.value = value
     return message
+
+
+@pytest.mark.parametrize("kind", [SetParameters, SetParametersAtomically])
+def test_a_type_that_ros_does_not_have_is_refused_by_name(graph: Any, kind: Any) -> None:
+    graph.start(EdgeMetricNode)
+    client = graph.client.create_client(kind, f"/edge_metric_node/{_snake(kind)}")
+    graph.wait_until(client.service_is_ready, "the service is there")
+    odd = ParameterMessage(name="threads", value=ParameterValue(type=99))
+    answer = graph.wait(client.call_async(kind.Request(parameters=[odd])))
+    result = answer.results[0] if kind is SetParameters else answer.result
+    assert not result.successful
+    assert result.reason == "parameter 'threads' must have a type of rcl_interfaces/ParameterType: got 99"
+
+
+def _snake(kind: Any) -> str:
+    return "set_parameters" if kind is SetParameters else "set_parameters_atomically"
 
 
 def test_a_list_of_wrong_elements_is_refused_by_name(graph: Any) -> None:

@@ -33,7 +33,9 @@ def photographs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 @pytest.fixture
 def photo(graph: Any, photographs: dict[str, str]) -> PhotoNode:
     # Slow frames: many tests may share this machine.
-    node: PhotoNode = graph.start(PhotoNode, **photographs, points_px=POINTS, **{"camera.frame_rate_hz": 10.0})
+    node: PhotoNode = graph.start(
+        PhotoNode, **photographs, points_px=POINTS, **{"head.model": "rolled", "camera.frame_rate_hz": 10.0}
+    )
     return node
 
 

@@ -12,6 +12,7 @@ from vergence_common.images import compressed_to_array, image_to_array
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_nanoseconds
 from vergence_msgs.msg import TrueBoxes, TrueVergence
+from vergence_sim.printed_head import printed_head
 from vergence_sim.ros.sim_node import SimNode
 
 pytestmark = [pytest.mark.graph, pytest.mark.usefixtures("opengl")]
@@ -20,7 +21,9 @@ pytestmark = [pytest.mark.graph, pytest.mark.usefixtures("opengl")]
 @pytest.fixture
 def sim(graph: Any) -> SimNode:
     # Slow frames: many tests may share this machine.
-    node: SimNode = graph.start(SimNode, **{"camera.frame_rate_hz": 10.0, "right_camera.clock_offset_s": 0.02})
+    node: SimNode = graph.start(
+        SimNode, **{"head.model": "rolled", "camera.frame_rate_hz": 10.0, "right_camera.clock_offset_s": 0.02}
+    )
     return node
 
 
@@ -136,3 +139,18 @@ def test_parameters_change_while_it_runs(graph: Any, sim: SimNode) -> None:
     refused = graph.set_parameters(sim, **{"camera.noise_sigma": 0.0, "motion.kind": "backwards"})
     assert not refused.successful
     assert "backwards" in refused.reason
+
+
+@pytest.mark.parametrize(
+    ("camera_info", "k"), [("none", (0.0, 0.0, 0.0)), ("nominal", (539.0, 319.5, 239.5)), ("calibrated", None)]
+)
+def test_a_printed_heads_cameras_say_of_themselves_what_is_asked_for(
+    graph: Any, camera_info: str, k: tuple[float, float, float] | None
+) -> None:
+    node = {"head.model": "printed", "head.seed": 2, "head.camera_info": camera_info, "camera.frame_rate_hz": 5.0}
+    graph.start(SimNode, **node)
+    info = graph.wait(graph.message(CameraInfo, "right/camera_info"))
+    assert (info.width, info.height) == (640, 480)
+    true = printed_head(2).right_camera
+    assert (info.k[0], info.k[2], info.k[5]) == (k or (true.fx_px, true.cx_px, true.cy_px))
+    assert len(info.d) == (0 if camera_info == "none" else 5)

@@ -17,6 +17,7 @@ ENVIRONMENTS = [
     ({"ROS_DOMAIN_ID": "abc"}, "ROS_DOMAIN_ID must be a whole number from 0 to 232: got 'abc'"),
     ({"ROS_DOMAIN_ID": "233"}, "ROS_DOMAIN_ID must be a whole number from 0 to 232: got '233'"),
     ({"ROS_DOMAIN_ID": "-1"}, "ROS_DOMAIN_ID must be a whole number from 0 to 232: got '-1'"),
+    ({"RMW_IMPLEMENTATION": "rmw_nosuch"}, "RMW_IMPLEMENTATION must be a middleware that is installed"),
     ({"HOME": "/proc/nobody"}, "HOME must be a folder in which logs can be written: got '/proc/nobody'"),
     ({"ROS_LOG_DIR": "/proc/logs"}, "ROS_LOG_DIR must be a folder in which logs can be written: got '/proc/logs'"),
 ]
@@ -51,7 +52,7 @@ def test_an_environment_in_which_a_node_cannot_start(environment: dict[str, str]
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[0])
-@pytest.mark.parametrize(("environment", "text"), [ENVIRONMENTS[0], ENVIRONMENTS[3]])
+@pytest.mark.parametrize(("environment", "text"), [ENVIRONMENTS[0], ENVIRONMENTS[3], ENVIRONMENTS[4]])
 def test_an_environment_in_which_a_command_cannot_start(
     command: list[str], environment: dict[str, str], text: str, domain_id: int
 ) -> None:

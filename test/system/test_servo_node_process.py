@@ -135,6 +135,45 @@ def test_the_guardian_releases_what_a_killed_node_leaves(start: Start, wires: Wi
     wait_for(lambda: wires.pulse_us(0) == 0.0, "the guardian releases")
 
 
+def test_the_guardian_releases_what_a_stopped_node_leaves_and_the_node_goes_on_later(start: Start, wires: Wires):
+    node = moving_node(start, wires, "-p", "release_timeout_s:=0.0", "-p", "guardian_timeout_s:=0.5")
+    node.send_signal(signal.SIGSTOP)
+    wait_for(lambda: wires.pulse_us(0) == 0.0, "the guardian releases")
+    node.send_signal(signal.SIGCONT)
+    assert node.stderr is not None
+    assert any("its guardian has released the servos" in line for line in node.stderr)
+    assert wires.pulse_us(0) == 0.0
+    commander = start(*commander_argv("steady", "0.5"))
+    wait_for(lambda: wires.pulse_us(0) > 0.0, "the servo starts again")
+    commander.send_signal(signal.SIGKILL)
+    node.send_signal(signal.SIGSTOP)
+    wait_for(lambda: wires.pulse_us(0) == 0.0, "the guardian releases again")
+    node.send_signal(signal.SIGCONT)
+
+
+def test_a_stopped_node_loses_the_pulses_of_a_daemon_too(start: Start, wires: Wires, tmp_path: Path):
+    daemon = PigpioDaemon()
+    path = tmp_path / "servos.yaml"
+    path.write_text("servos: {tilt: {channel: 17}}\n")
+    more = (
+        "servos:=" + str(path),
+        "backend:=pigpio",
+        f"pigpio.port:={daemon.port}",
+        "joints:=[tilt]",
+        "park_rad:=[0.0]",
+    )
+    try:
+        node = start(*servo_argv(wires, *(part for value in more for part in ("-p", value))))
+        commander = start(*commander_argv("steady", "0.2", "tilt"))
+        wait_for(lambda: daemon.pulses.get(17, 0) > 0, "the servo is driven")
+        node.send_signal(signal.SIGSTOP)
+        wait_for(lambda: daemon.pulses[17] == 0, "the guardian releases")
+        commander.send_signal(signal.SIGKILL)
+        node.send_signal(signal.SIGCONT)
+    finally:
+        daemon.close()
+
+
 def test_every_backend_that_pulses_on_has_a_guardian(start: Start, wires: Wires, tmp_path: Path):
     daemon = PigpioDaemon()
     path = tmp_path / "servos.yaml"

@@ -15,9 +15,7 @@ from launch.actions import LogInfo
 
 from vergence_bringup.launching.servo_choice import chosen_backend, fakes_banner, problems
 from vergence_bringup.ros.launch_actions import config_folder, described, frames, head, host, node
-
-EYES = ("left", "right")
-
+from vergence_rig.head_bodies import EYES, OPTICAL_FRAMES
 
 Settings = dict[str, tuple[str, dict[str, str]]]
 """By the name that head_node gives a node: its executable and its parameters beyond its files."""
@@ -32,7 +30,7 @@ def camera(eye: str, values: Mapping[str, str]) -> dict[str, str]:
         "rig": values["rig"],
         "device": values[f"{eye}_device"],
         "camera_info_url": values[f"{eye}_camera_info_url"],
-        "frame_id": f"{eye}_camera_optical_frame",
+        "frame_id": OPTICAL_FRAMES[eye],
         "lock": lock,
         "partner": partner,
     }

@@ -59,6 +59,12 @@ def test_the_laptop_has_the_arguments_of_the_rig_but_the_servos():
     [
         ("sim.launch.py", "detector", "no", "detector must be true or false: got 'no'"),
         ("sim.launch.py", "preset", "perfect", "preset must be realistic or ideal: got 'perfect'"),
+        (
+            "sim.launch.py",
+            "head",
+            "wooden",
+            "head must be printed, rolled, ideal, rig or the path of an existing file: got 'wooden'",
+        ),
         ("rig.launch.py", "servos", "false", "servos must be the path of an existing file: got 'false'"),
         ("rig.launch.py", "servos", "/nowhere/servos.yaml", "existing file: got '/nowhere/servos.yaml'"),
         ("rig.launch.py", "servo_node", SERVOS, "servo_node must be true or false"),
@@ -157,7 +163,7 @@ def test_the_pages_use_arguments_and_values_that_exist():
     for file, words in lines:
         assert unknown(file, [file, *words]) == [], (file, words)
         values = dict(word.split(":=", 1) for word in words)
-        files = {argument.name for argument in ARGUMENTS[file] if argument.is_file}
+        files = {argument.name for argument in ARGUMENTS[file] if argument.is_file and not argument.choices}
         assert problems(file, {name: value for name, value in values.items() if name not in files}) == [], (file, words)
         # A path in a page is an example.
         assert all("/" in value or value.endswith(".yaml") for name, value in values.items() if name in files), words

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from vergence_bringup.machine import build_hint
+from vergence_rig.middleware import middleware_problem
 from vergence_rig.printed import printed_line
 
 COMMANDS = {
@@ -16,10 +17,14 @@ COMMANDS = {
         "vergence_calibration.ros.identify",
         "measure timing and geometry of a running head and write them to YAML",
     ),
+    "fixation": ("vergence_bringup.commands.fixation", "where axes at the paper's angles C1 and C2 meet"),
     "look": ("vergence_bringup.ros.look", "look at a pixel, a class, a point or by angles, and say whether it verged"),
     "watch": ("vergence_bringup.ros.watch", "show a running graph in the terminal"),
     "doctor": ("vergence_bringup.commands.doctor", "check this machine: what is missing, and how to install it"),
 }
+
+
+_WITHOUT_GRAPH = {"measure", "doctor"}
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -53,6 +58,9 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     for name, (module_name, summary) in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=summary, description=summary)
         if name == given:
+            problem = "" if name in _WITHOUT_GRAPH else middleware_problem()
+            if problem:
+                subparser.exit(2, f"vergence {name}: {problem}\n")
             module = importlib.import_module(module_name)
             module.add_arguments(subparser)
             subparser.set_defaults(run=module.run)

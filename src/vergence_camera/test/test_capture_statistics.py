@@ -66,3 +66,16 @@ def test_a_reconnect_begins_the_sequence_anew() -> None:
     assert (state.dropped_by_driver, state.reconnects) == (0, 1)
     assert state.values()["fault.usb_bandwidth"] == 1
     assert state.values()["last_fault"] == "full"
+
+
+def test_the_time_without_a_published_frame_counts_from_the_start_and_from_the_last_one() -> None:
+    clock = Steady()
+    health = CaptureStatistics(clock)
+    health.connected(Mode("MJPG", 640, 480, 30.0))
+    clock.s += 2.0
+    health.received(1, 0)
+    health.too_old()
+    assert health.snapshot().unpublished_s == pytest.approx(2.0)
+    health.published(0.01)
+    clock.s += 0.5
+    assert health.snapshot().unpublished_s == pytest.approx(0.5)

@@ -14,7 +14,10 @@ _WINDOW = 150
 
 @dataclass(frozen=True)
 class CaptureSnapshot:
-    """The state at one moment. Times are in seconds; NaN before the first measurement."""
+    """The state at one moment. Times are in seconds; NaN before the first measurement.
+
+    `unpublished_s` is the time since a frame went out, or since the stream began.
+    """
 
     connected: bool
     ended: bool
@@ -30,6 +33,7 @@ class CaptureSnapshot:
     reconnects: int
     faults: dict[str, int]
     last_fault: str
+    unpublished_s: float = 0.0
 
     def values(self) -> dict[str, object]:
         """Return the values by name, for a diagnostic."""
@@ -72,6 +76,7 @@ class CaptureStatistics:
         self._last_fault = ""
         self._expected: int | None = None
         self._corrupt_since_last = 0
+        self._published_s = now_s()
 
     def connected(self, mode: Mode) -> None:
         """The stream has begun, or begun again."""
@@ -79,6 +84,7 @@ class CaptureStatistics:
         self._mode, self._expected, self._corrupt_since_last = mode, None, 0
         self._was_connected = self._connected = True
         self._arrivals_s.clear()
+        self._published_s = self._now_s()
 
     def fault(self, error: CameraError) -> None:
         """The stream has failed, or could not be begun."""
@@ -109,6 +115,7 @@ class CaptureStatistics:
     def published(self, stamp_to_publish_s: float) -> None:
         """A frame has gone out, that long after its stamp."""
         self._counts.frames += 1
+        self._published_s = self._now_s()
         self._delays_s.append(stamp_to_publish_s)
 
     def ended(self) -> None:
@@ -135,4 +142,5 @@ class CaptureStatistics:
             reconnects=counts.reconnects,
             faults=dict(counts.faults),
             last_fault=self._last_fault,
+            unpublished_s=self._now_s() - self._published_s,
         )

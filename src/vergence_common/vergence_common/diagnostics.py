@@ -2,16 +2,21 @@
 
 import socket
 from collections.abc import Callable
+from itertools import islice
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from vergence_common.clock_health import ClockHealth
 from vergence_rig.report import ERROR, OK, STALE, WARN, Report
 
 __all__ = ["ERROR", "OK", "STALE", "WARN", "Diagnostics", "Report"]
 
 PERIOD_S = 1.0
+
+LONGEST_MESSAGE, LONGEST_VALUE, MOST_VALUES = 500, 300, 100
+"""Bounds of what one status says: what is counted and quoted may come from outside."""
 
 
 class Diagnostics:
@@ -24,6 +29,7 @@ class Diagnostics:
         self._node = node
         self._hardware_id = hardware_id or socket.gethostname()
         self._sources: dict[str, Callable[[], Report]] = {}
+        self._clock = ClockHealth(node)
         self._message, self._statuses = DiagnosticArray(), dict[str, DiagnosticStatus]()
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         # Simulated time may stand, and then the reports say why.
@@ -41,7 +47,8 @@ class Diagnostics:
                 reports[name] = source()
             except Exception as error:  # a report must never end the node it reports on
                 reports[name] = Report(ERROR, f"the report failed: {type(error).__name__}: {error}")
-        return reports
+        clock = self._clock.report()
+        return reports if clock is None else {"clock": clock, **reports}
 
     def publish(self) -> None:
         """Publish all reports."""
@@ -52,17 +59,21 @@ class Diagnostics:
     def _status(self, name: str, report: Report) -> DiagnosticStatus:
         """Return the status, made once per name and set of values, because building messages is slow."""
         status = self._statuses.get(name)
-        if status is None or [entry.key for entry in status.values] != list(report.values):
+        values = dict(islice(report.values.items(), MOST_VALUES))
+        if status is None or [entry.key for entry in status.values] != [_bounded(key, LONGEST_VALUE) for key in values]:
             status = self._statuses[name] = DiagnosticStatus(
                 name=f"{self._node.get_fully_qualified_name().lstrip('/')}: {name}",
                 hardware_id=self._hardware_id,
-                values=[KeyValue(key=key) for key in report.values],
+                values=[KeyValue(key=_bounded(key, LONGEST_VALUE)) for key in values],
             )
-        status.level, status.message = bytes([report.level]), report.message
-        for entry, value in zip(status.values, report.values.values(), strict=True):
-            entry.value = _text(value)
+        status.level, status.message = bytes([report.level]), _bounded(report.message, LONGEST_MESSAGE)
+        for entry, value in zip(status.values, values.values(), strict=True):
+            entry.value = f"{value:.6g}" if isinstance(value, float) else _bounded(str(value), LONGEST_VALUE)
         return status
 
 
-def _text(value: object) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def _bounded(text: str, longest: int) -> str:
+    """Return a text of at most so many characters, which a message can carry."""
+    kept = text if len(text) <= longest else f"{text[: longest - 4]} ..."
+    # Names that come from a topic or a device may hold anything; a message is UTF-8 without NUL.
+    return kept if kept.isprintable() else kept.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode()

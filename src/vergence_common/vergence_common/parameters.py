@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -169,6 +170,24 @@ def _refuse_by_name(node: Node, parameter_set: ParameterSet) -> None:
         return result
 
     node.set_parameters_atomically = set_parameters_atomically
+    for service in node.services:
+        if service.srv_type in (SetParameters, SetParametersAtomically):
+            service.callback = partial(_answer_odd_types, service.callback)
+
+
+def _answer_odd_types(answer: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+    """Refuse values of a type that ROS does not have: rclpy raises, which would end the node."""
+    known = {int(kind.value) for kind in Parameter.Type}
+    odd = next((parameter for parameter in request.parameters if parameter.value.type not in known), None)
+    if odd is None:
+        return answer(request, response)
+    reason = f"parameter '{odd.name}' must have a type of rcl_interfaces/ParameterType: got {odd.value.type}"
+    refused = SetParametersResult(successful=False, reason=reason)
+    if isinstance(response, SetParameters.Response):
+        response.results = [refused] * len(request.parameters)
+    else:
+        response.result = refused
+    return response
 
 
 def _typed(change: Parameter, spec: ParameterSpec | None) -> Parameter:

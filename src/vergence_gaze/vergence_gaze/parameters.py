@@ -11,6 +11,9 @@ from vergence_gaze.target_parameters import TargetParameters
 from vergence_gaze.verged_parameters import VergedParameters
 from vergence_rig.parameters import Parameters, parameter
 
+LONGEST_GOAL_S = 600.0
+"""Largest time limit of a goal [s]."""
+
 MODES = ("both_eyes", "left_held", "right_held")
 
 Group = TypeVar("Group", bound=Parameters)
@@ -29,7 +32,11 @@ class ControlParameters(Parameters):
         choices=("idle", "verge"),
     )
     time_limit_s: float = parameter(
-        5.0, "time limit of a goal that states none; the goal then fails", unit="s", minimum=0.1, maximum=600
+        5.0,
+        "time limit of a goal that states none; the goal then fails",
+        unit="s",
+        minimum=0.1,
+        maximum=LONGEST_GOAL_S,
     )
     no_images_s: float = parameter(
         2.0,

@@ -106,19 +106,22 @@ def test_a_shape_that_could_be_two_layouts_asks_for_one(tmp_path):
     assert load(path, layout="yolov6").layout.name == "yolov6"
 
 
-def constant_model(folder: Path, output: np.ndarray, task: str = "") -> Path:
-    """A model that always gives the same output."""
+def constant_model(folder: Path, *outputs: np.ndarray, task: str = "") -> Path:
+    """A model that always gives the same outputs."""
     mean = helper.make_node("ReduceMean", ["images"], ["mean"], keepdims=0)
     nothing = helper.make_node("Mul", ["mean", "zero"], ["nothing"])
-    add = helper.make_node("Add", ["constant", "nothing"], ["output0"])
+    names = [f"output{i}" for i in range(len(outputs))]
     graph = helper.make_graph(
-        [mean, nothing, add],
+        [mean, nothing, *(helper.make_node("Add", [f"constant_{name}", "nothing"], [name]) for name in names)],
         "constant",
         [helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, 96, 128])],
-        [helper.make_tensor_value_info("output0", TensorProto.FLOAT, None)],
+        [helper.make_tensor_value_info(name, TensorProto.FLOAT, None) for name in names],
         [
             onnx.numpy_helper.from_array(np.array(0.0, np.float32), "zero"),
-            onnx.numpy_helper.from_array(output, "constant"),
+            *(
+                onnx.numpy_helper.from_array(output, f"constant_{name}")
+                for name, output in zip(names, outputs, strict=True)
+            ),
         ],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
@@ -258,3 +261,41 @@ def test_the_model_names_its_own_threshold(onnx_model):
     assert len(load(strict, threshold=0.0).detect(picture())) == 1
     assert len(load(strict, threshold=0.5).detect(picture())) == 2
     assert load(onnx_model("yolov6", metadata={"threshold": "high"}), threshold=0.0).threshold == 0.35
+
+
+def yolov8_output(classes: int = 2) -> np.ndarray:
+    """Boxes that grow, and small scores, for the 252 cells of 128x96."""
+    output = np.zeros((1, 4 + classes, 252), np.float32)
+    output[0, :4] = np.linspace(10, 90, 252)
+    output[0, 4:] = np.linspace(0.0, 0.3, 252)
+    return output
+
+
+@pytest.mark.parametrize("layout", ["auto", "yolox", "yolov8"])
+@pytest.mark.parametrize("shape", [(1, 252, 4), (1, 252), (1, 10), (1, 32, 24, 32), (1,)])
+def test_an_output_that_no_layout_explains_refuses_the_model(tmp_path, shape, layout):
+    model = constant_model(tmp_path, yolov8_output(), np.zeros(shape, np.float32))
+    with pytest.raises(ModelLayoutError, match=r"must be explained: output1 \[1") as refused:
+        load(model, layout=layout)
+    assert "\n" not in str(refused.value)
+
+
+def test_boxes_and_scores_apart_are_no_yolox(tmp_path):
+    boxes, scores = np.zeros((1, 252, 4), np.float32), np.zeros((1, 252, 80), np.float32)
+    with pytest.raises(ModelLayoutError, match=r"must be explained: output0 \[1, 252, 4\]"):
+        load(constant_model(tmp_path, boxes, scores))
+
+
+def test_the_maps_before_decoding_are_explained(tmp_path):
+    maps = [np.zeros((1, 66, 96 // s, 128 // s), np.float32) for s in (8, 16, 32)]
+    assert load(constant_model(tmp_path, yolov8_output(), *maps)).layout.name == "yolov8"
+
+
+def test_nan_is_an_error_at_the_start_and_later(tmp_path, onnx_model):
+    broken = yolov8_output()
+    broken[0, 4, 7] = np.nan
+    with pytest.raises(ModelLayoutError, match=r"must be numbers: 0% of \[1, 6, 252\] are NaN"):
+        load(constant_model(tmp_path, broken))
+    detector = load(onnx_model("yolov8"))
+    with pytest.raises(DetectorError, match="output 0 of the model must be numbers"):
+        detector.layout.candidates([np.full((1, 6, 252), np.nan, np.float32)], (128, 96), 0.5)

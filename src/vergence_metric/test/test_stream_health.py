@@ -59,3 +59,42 @@ def test_the_rate_forgets_what_was_before_a_gap() -> None:
     for i in range(10):
         health.accept(200.0 + i / 10, 0.01, (640, 480))
     assert health.rate_hz == pytest.approx(10.0)
+
+
+def stamped(stamps_s: list[float], age_s: float = 0.01) -> StreamHealth:
+    """A stream whose images arrive at 30 Hz and have these stamps."""
+    health = StreamHealth("left/image_raw", 100.0)
+    for i, stamp_s in enumerate(stamps_s):
+        health.accept(100.0 + i / 30, age_s, (640, 480), stamp_s)
+    return health
+
+
+@pytest.mark.parametrize(
+    ("stamps_s", "words"),
+    [
+        ([0.0] * 20, "stamps must increase from image to image: they are zero"),
+        ([7.0] * 20, "stamps must increase from image to image: 19 of the last 19 do not"),
+        ([9.0 - i / 30 for i in range(20)], "stamps must increase"),
+        ([5.0 + i / 1.5 for i in range(5)], "slower than needed: 1.5 Hz, at least 5 Hz"),
+        ([*(5.0 + i / 30 for i in range(60)), 7.6, 8.3, 9.0], "slower than needed: 1.4 Hz"),
+    ],
+)
+def test_stamps_that_cannot_be_used_are_named(stamps_s: list[float], words: str) -> None:
+    status = stamped(stamps_s).status(100.0 + len(stamps_s) / 30, 1, 1.0)
+    assert not status.ok
+    assert words in status.message
+
+
+@pytest.mark.parametrize(
+    ("age_s", "words"), [(10.0, "10 s old"), (-10.0, "10 s ahead of the clock"), (1.7e9, "1.7e+09 s old")]
+)
+def test_stamps_of_another_clock_are_named(age_s: float, words: str) -> None:
+    status = stamped([5.0 + i / 30 for i in range(20)], age_s).status(100.7, 1, 1.0)
+    assert not status.ok
+    assert words in status.message
+
+
+@pytest.mark.parametrize("rate_hz", [5.5, 15.0, 120.0])
+def test_usual_rates_with_a_lost_frame_are_no_fault(rate_hz: float) -> None:
+    stamps_s = [5.0 + i / rate_hz for i in range(40) if i % 11]
+    assert stamped(stamps_s).status(100.0 + 36 / 30, 1, 1.0).ok

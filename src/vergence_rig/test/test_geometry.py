@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence_rig import geometry as g
-from vergence_rig.testing.paper_geometry import paper_fixation
+from vergence_rig.paper_fixation import paper_fixation
 
 BASELINE_M = 0.065
 
@@ -18,8 +18,17 @@ def test_the_papers_80_80_degree_case() -> None:
     assert math.degrees(found.vergence_rad) == pytest.approx(20)
     assert found.om_m == pytest.approx(0.5 * BASELINE_M * math.tan(math.radians(80)))
     assert found.om_m == pytest.approx(0.184317, abs=1e-6)
-    assert found.x_m == pytest.approx(found.om_m)
+    assert found.distance_m == pytest.approx(found.om_m)
+    assert found.c1m_m == pytest.approx(0.5 * BASELINE_M)
     assert found.y_m == pytest.approx(0, abs=1e-15)
+
+
+def test_the_papers_foot_is_not_the_middle_where_the_angles_differ() -> None:
+    # A right angle at C1: O stands above the left eye, and the triangle's legs are d and OM = d tan C2.
+    found = paper_fixation(math.radians(90), math.radians(60), BASELINE_M)
+    assert found.c1m_m == pytest.approx(0.0, abs=1e-15)
+    assert found.om_m == pytest.approx(BASELINE_M * math.tan(math.radians(60)))
+    assert found.distance_m == pytest.approx(math.hypot(0.5 * BASELINE_M, found.om_m))
 
 
 def test_the_papers_angles_agree_with_pan_angles() -> None:
@@ -33,9 +42,10 @@ def test_the_papers_angles_agree_with_pan_angles() -> None:
 def test_paper_fixation_equals_3d_fixation_off_axis(x: float, y: float, baseline_m: float) -> None:
     eyes = g.gaze_for_point((x, y, 0.0), baseline_m)
     found = paper_fixation(math.pi / 2 + eyes.pan_left_rad, math.pi / 2 - eyes.pan_right_rad, baseline_m)
-    assert found.x_m == pytest.approx(x, rel=1e-6)
+    assert found.om_m == pytest.approx(x, rel=1e-6)
     assert found.y_m == pytest.approx(y, rel=1e-6, abs=1e-9)
-    assert found.om_m == pytest.approx(math.hypot(x, y), rel=1e-6)
+    assert found.c1m_m == pytest.approx(0.5 * baseline_m - y, rel=1e-6, abs=1e-9)
+    assert found.distance_m == pytest.approx(math.hypot(x, y), rel=1e-6)
 
 
 points = st.tuples(st.floats(0.1, 5.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from vergence_rig.rig import JOINT_NAMES, JointSpec, Rig, RigError, default_rig
-from vergence_rig.rig_file import load_rig, rig_as_mapping, rig_from_mapping
+from vergence_rig.rig_file import load_rig, rig_as_mapping, rig_from_mapping, write_rig
 from vergence_rig.servo import IDEAL, MG995, SG90
+from vergence_rig.testing.odd_heads import SHARES, odd_head
 
 CONFIG = Path(__file__).resolve().parents[3] / "config" / "rig.yaml"
 
@@ -106,3 +107,9 @@ def test_a_rig_as_mapping_gives_the_same_rig() -> None:
     for rig in (default_rig(), default_rig().with_servos(slow, MG995), Rig(baseline_m=0.1, minimum_vergence_rad=0.02)):
         assert rig_from_mapping(rig_as_mapping(rig)) == rig
         assert rig_from_mapping(rig_as_mapping(rig) | {"identified": {"anything": 1}}) == rig
+
+
+def test_a_rig_that_is_written_is_read_again(tmp_path: Path) -> None:
+    rig = odd_head([0.3, -0.7] * (SHARES // 2) + [0.5])
+    write_rig(tmp_path / "new" / "rig.yaml", rig)
+    assert load_rig(tmp_path / "new" / "rig.yaml") == rig

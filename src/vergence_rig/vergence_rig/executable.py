@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vergence_rig.install_hint import install_hint
+from vergence_rig.middleware import middleware_problem
 
 STATUS_BAD_INPUT = 2
 
@@ -23,6 +24,10 @@ def run(module: str, optional: Sequence[str] = (), tool: bool = False) -> int:
         tool: let Ctrl-C raise KeyboardInterrupt in `main`, which handles it; a node handles the signal itself.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    problem = middleware_problem()
+    if problem:
+        print(f"{Path(sys.argv[0]).stem}: {problem}", file=sys.stderr)
+        return STATUS_BAD_INPUT
     try:
         main = importlib.import_module(module).main
     except ModuleNotFoundError as error:

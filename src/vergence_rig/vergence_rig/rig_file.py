@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+import yaml
+
 from vergence_rig.parameters import ParameterError, Parameters, shown
 from vergence_rig.rig import JOINT_NAMES, CameraSpec, EyeMount, Joints, JointSpec, Rig, RigError, default_rig
 from vergence_rig.servo import PRESETS, ServoSpec
@@ -53,6 +55,12 @@ def rig_as_mapping(rig: Rig) -> dict[str, Any]:
     numbers = {key: getattr(rig, key) for key in _NUMBERS}
     groups = {key: _entries(getattr(rig, key)) for key in _GROUPS}
     return {**numbers, **groups, "joints": {name: _joint_entries(joint) for name, joint in rig.joints.items()}}
+
+
+def write_rig(path: Path, rig: Rig) -> None:
+    """Write a rig as a file that `load_rig` reads, with every key; its folder is made where it is missing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(rig_as_mapping(rig), sort_keys=False), encoding="utf-8")
 
 
 def _joint_entries(joint: JointSpec) -> dict[str, Any]:

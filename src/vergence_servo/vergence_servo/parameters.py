@@ -44,6 +44,14 @@ class ServoNodeParameters(HeadParameters):
         "start a second process that releases the servos if this one is killed (backends that would go on pulsing)",
         read_only=True,
     )
+    guardian_timeout_s: float = parameter(
+        1.0,
+        "time for which this node may hang before the guardian releases the servos",
+        unit="s",
+        minimum=0.2,
+        maximum=60,
+        read_only=True,
+    )
     update_rate_hz: float = parameter(
         100.0, "rate at which pulses are sent along a motion", unit="Hz", minimum=10, maximum=1000, read_only=True
     )

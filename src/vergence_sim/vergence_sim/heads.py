@@ -10,6 +10,8 @@ from vergence_sim.printed_head import printed_head
 
 DEFAULT_MODEL = "rolled"
 """The head that is simulated where none is named: equal to the shipped sim_node.yaml and photo_node.yaml."""
+MODELS = ("printed", "rolled", "ideal", "rig")
+"""The values of `head.model` that are no path."""
 
 _ROLLED_DISTORTION = (-0.04, 0.02, 0.0, 0.0, 0.0)
 

@@ -17,9 +17,10 @@ _DISTORTION_OFF = np.array([0.01, 0.005, 5e-4, 5e-4, 0.0])
 def printed_head(seed: int) -> Rig:
     """Return a head with the default's baseline, image size and joint limits, all else a seeded amount off.
 
-    Lenses about 22 mm before their pan axes and up to 4 mm beside them, the tilt axis about 45 mm below. Cameras rolled
-    up to 2 degrees, pitched up to 2 degrees apart, yawed up to 3. Horn zeros up to 4 degrees off, joints turning 0.95
-    to 1.05 times what is commanded. Principal points up to 25 px off, focal lengths 1 to 3 % apart.
+    Lenses about 22 mm before their pan axes and up to 4 mm beside them, at heights up to 1.5 mm apart, the tilt axis
+    about 45 mm below. Cameras rolled up to 2 degrees, pitched up to 2 degrees apart, yawed up to 3. Horn zeros up to 4
+    degrees off, joints turning 0.95 to 1.05 times what is commanded. Principal points up to 25 px off, focal lengths 1
+    to 3 % apart.
     """
     random = np.random.default_rng([seed, 15])
 
@@ -31,10 +32,10 @@ def printed_head(seed: int) -> Rig:
     mounts = [
         EyeMount(
             axis_x_m=off(1.0 * _MM),
-            axis_z_m=off(0.5 * _MM),
+            axis_z_m=off(0.25 * _MM),
             lens_x_m=LENS_AHEAD_M + off(2.0 * _MM),
             lens_y_m=off(4.0 * _MM),
-            lens_z_m=off(1.5 * _MM),
+            lens_z_m=off(0.5 * _MM),
             roll_rad=off(2.0 * _DEG),
             pitch_rad=pitch_rad + side * 0.5 * pitch_apart_rad,
             yaw_rad=off(3.0 * _DEG),

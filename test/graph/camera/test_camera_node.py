@@ -217,3 +217,14 @@ def test_simulated_time_rules_the_stamps(
     push_until(graph, camera, lambda: bool(listener.messages), "a frame")
     stamp_ns = to_nanoseconds(listener.messages[-1].header.stamp)
     assert 900 * 1000 * MS < stamp_ns <= 1000 * 1000 * MS
+
+
+def test_frames_that_are_all_too_old_are_no_healthy_stream(
+    graph: Any, machine: FakeMachine, start: Callable[..., CameraNode], playing: Callable[..., None]
+) -> None:
+    camera = machine.plug_in(0)
+    start(stamp_offset_s=0.9, max_age_s=0.25, stall_timeout_s=0.2)
+    playing(camera, 30.0)
+    status = graph.diagnostic("camera_node: camera", lambda s: "no image is published" in s.message)
+    assert status.level == DiagnosticStatus.ERROR
+    assert "frames are older than max_age_s" in status.message

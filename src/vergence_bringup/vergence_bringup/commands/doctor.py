@@ -14,9 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from vergence_bringup.commands.doctor_trials import folders, middleware, rig_files, shared_memory
 from vergence_bringup.graph_errors import ProcessError
 from vergence_bringup.machine import APT_ROS, build_hint, is_ros_workspace, package_hint, profile_hint
-from vergence_bringup.node_table import NODES
+from vergence_bringup.node_table import HOSTS, NODES
 from vergence_bringup.ros.processes import config_dir, find_node
 from vergence_rig.finding import Finding
 from vergence_rig.install_hint import install_hint
@@ -33,11 +34,16 @@ _SHM_NEEDED_MB = 64  # two cameras, three readers and slack, in segments of 16 M
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the subcommand."""
     parser.add_argument("--no-render", action="store_true", help="skip the rendering test (it takes two seconds)")
+    parser.add_argument("--rig", default="", metavar="FILE", help="rig.yaml to open (default: the built-in rig)")
+    parser.add_argument("--servos", default="", metavar="FILE", help="servos.yaml whose drivers are opened")
+    parser.add_argument("--backend", default="kernel_pwm", help="driver of servos for which the file names none")
+    parser.add_argument("--model", default="", metavar="FILE", help="ONNX file of the detector to load")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print every finding; 0 if all required checks passed."""
-    findings = list(examine(render=not options.no_render))
+    files = (options.rig, options.servos, options.backend, options.model)
+    findings = list(examine(render=not options.no_render, files=files))
     for finding in findings:
         mark = "ok  " if finding.ok else ("FAIL" if finding.needed else "note")
         print(f"{mark}  {finding.name}: {finding.message}")
@@ -48,14 +54,18 @@ def run(options: argparse.Namespace) -> int:
     return 1 if missing else 0
 
 
-def examine(render: bool = True) -> Iterable[Finding]:
-    """Yield a finding for everything that nodes, demo and build depend on."""
+def examine(render: bool = True, files: tuple[str, str, str, str] = ("", "", "", "")) -> Iterable[Finding]:
+    """Yield a finding for everything that nodes, demo and build depend on; `files` are those of `rig_files`."""
     yield from _guarded("python", _python)
     yield from _guarded("compiler", _compiler)
     yield from _guarded("ros", _ros)
     yield from _guarded("nodes", _nodes)
     yield from _guarded("middleware", _middleware)
     yield from _guarded("shared memory", _shared_memory)
+    yield from _guarded("shared memory segment", shared_memory)
+    yield from _guarded("folders", folders)
+    yield from _guarded("ROS context", middleware)
+    yield from _guarded("rig", lambda: rig_files(*files))
     yield from _guarded("rendering", lambda: _rendering(render))
     yield from _guarded("groups", _groups)
     yield from _guarded("cameras", _cameras)
@@ -99,21 +109,22 @@ def _ros() -> Iterable[Finding]:
 
 def _nodes() -> Iterable[Finding]:
     absent = []
-    for executable in NODES:
+    for executable in (*NODES, *HOSTS):
         try:
             find_node(executable)
         except ProcessError as error:
             absent.append(str(error))
-    message = f"{len(NODES) - len(absent)} of {len(NODES)} are built" + "".join(f"; {text}" for text in absent)
+    count = len(NODES) + len(HOSTS)
+    message = f"{count - len(absent)} of {count} are built" + "".join(f"; {text}" for text in absent)
     # A Pi has only what the servos need.
-    needed = len(absent) == len(NODES) or not is_ros_workspace()
+    needed = len(absent) == count or not is_ros_workspace()
     yield Finding("nodes", not absent, message, build_hint(), needed)
 
 
 def _middleware() -> Iterable[Finding]:
     profile = os.environ.get("FASTRTPS_DEFAULT_PROFILES_FILE")
     remedy = profile_hint(config_dir() / "fastdds.xml")
-    if os.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp") != "rmw_fastrtps_cpp":
+    if (os.environ.get("RMW_IMPLEMENTATION") or "rmw_fastrtps_cpp") != "rmw_fastrtps_cpp":
         name = os.environ["RMW_IMPLEMENTATION"]
         yield Finding("DDS", True, f"{name} is used: the shipped Fast DDS profile has no effect", needed=False)
     elif profile is None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from vergence_rig.regular_file import FileError, check_regular_file, expanded
 from vergence_servo.drivers.registry import backend_names
+from vergence_sim.heads import DEFAULT_MODEL, MODELS
 
 TRUE_FALSE = ("true", "false")
 _OF_LAUNCH_ITSELF = frozenset({"launch-prefix", "launch-prefix-filter"})
@@ -21,7 +22,8 @@ class LaunchArgument:
         description: shown by `ros2 launch --show-args`.
         default: the value where none is given; None makes the argument required.
         choices: the only values allowed; empty allows any text.
-        is_file: the value must be the path of an existing file, or empty where the default is empty.
+        is_file: the value must be the path of an existing file, one of the choices where there are any, or empty where
+            the default is empty.
         shipped: the default is the path of this file of the package's config folder.
     """
 
@@ -39,7 +41,8 @@ class LaunchArgument:
 
     def help(self) -> str:
         """Return the description with the values allowed."""
-        return f"{self.description} ({' or '.join(self.choices)})" if self.choices else self.description
+        choices = self.choices + ("a path",) * self.is_file if self.choices else ()
+        return f"{self.description} ({' or '.join(choices)})" if choices else self.description
 
     def default_in(self, config: Path) -> str | None:
         """Return the default, with the shipped configuration in `config`."""
@@ -47,18 +50,21 @@ class LaunchArgument:
 
     def problem(self, value: str) -> str | None:
         """Return what is wrong with a value, or None."""
-        if self.choices and value not in self.choices:
+        if value in self.choices:
+            return None
+        if self.choices and not self.is_file:
             return f"{self.name} must be {_listed(self.choices)}: got {value!r}"
         if self.is_file and not (value == "" and self.default == ""):
             try:
                 check_regular_file(value)
             except FileError as error:
-                return f"{self.name} must be the path of an existing file: got {value!r}, which {error}"
+                allowed = _listed((*self.choices, "the path of an existing file"))
+                return f"{self.name} must be {allowed}: got {value!r}, which {error}"
         return None
 
     def read(self, text: str) -> str:
         """Return the value of a text of the command line: `~` expanded in paths, `True` and `TRUE` as `true`."""
-        if self.is_file and text:
+        if self.is_file and text and text not in self.choices:
             return str(expanded(text))
         return text.lower() if self.choices == TRUE_FALSE and text.lower() in TRUE_FALSE else text
 
@@ -112,7 +118,14 @@ ARGUMENTS: dict[str, tuple[LaunchArgument, ...]] = {
     "sim.launch.py": (
         _NAMESPACE,
         _RIG,
-        LaunchArgument("preset", "imperfections of cameras and servos", "realistic", ("realistic", "ideal")),
+        LaunchArgument("preset", "imperfections of head, cameras and servos", "realistic", ("realistic", "ideal")),
+        LaunchArgument(
+            "head",
+            "head that is simulated, apart from the nodes' rig.yaml; rig is that rig.yaml, a path another one",
+            DEFAULT_MODEL,
+            MODELS,
+            is_file=True,
+        ),
         _switch(
             "detector", "run box_metric_node, whose detector finds the simulator's cube; needs onnxruntime", "true"
         ),
@@ -180,4 +193,4 @@ def _suggestion(name: str, known: Sequence[str]) -> str:
 
 
 def _listed(choices: Sequence[str]) -> str:
-    return ", ".join(choices[:-1]) + f" or {choices[-1]}"
+    return ", ".join(choices[:-1]) + " or " * (len(choices) > 1) + choices[-1]

@@ -10,7 +10,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from vergence_camera.capture_loop import CaptureLoop, RetryPolicy
-from vergence_camera.capture_statistics import CaptureStatistics
+from vergence_camera.capture_statistics import CaptureSnapshot, CaptureStatistics
 from vergence_camera.control_port import ControlPort
 from vergence_camera.devices import SystemTree, choose, find_devices
 from vergence_camera.errors import CameraError, CorruptFrameError
@@ -33,6 +33,8 @@ from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import from_nanoseconds
 from vergence_rig.rig_file import load_rig
+
+_SILENT_S = 0.5
 
 
 class CameraNode(Node):
@@ -200,6 +202,8 @@ class CameraNode(Node):
             return Report(STALE, "the recording has ended", values)
         if not state.connected or state.mode is None:
             return Report(ERROR, state.last_fault or "not connected yet", values)
+        if state.unpublished_s > settings.stall_timeout_s + _SILENT_S:
+            return Report(ERROR, f"no image is published for {state.unpublished_s:.1f} s: {_cause(state)}", values)
         if state.mode.rate_hz and state.rate_hz < 0.9 * state.mode.rate_hz:
             text = f"{state.rate_hz:.1f} Hz of {state.mode.rate_hz:g} Hz: a dim room, or USB or CPU at their limit"
             return Report(WARN, text, values)
@@ -241,6 +245,13 @@ class CameraNode(Node):
             self.get_logger().warning(text)
         else:
             self.get_logger().info(text)
+
+
+def _cause(state: CaptureSnapshot) -> str:
+    """Return why frames that arrive are not published."""
+    if state.too_old:
+        return f"{state.too_old} frames are older than max_age_s when they arrive (stamp_offset_s shifts their stamps)"
+    return state.last_fault or "no whole frame arrives"
 
 
 def main(args: Sequence[str] | None = None) -> int:

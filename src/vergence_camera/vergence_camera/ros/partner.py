@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -42,7 +43,7 @@ class PartnerCamera:
         self._client = AsyncParameterClient(node, partner)
         namespace = partner.rpartition("/")[0]
         node.create_subscription(CameraInfo, f"{namespace}/camera_info", self._on_camera_info, IMAGE_QOS)
-        node.create_timer(_PERIOD_S, self._request)
+        node.create_timer(_PERIOD_S, self._request, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def report(self, own: EyeCamera, max_skew_s: float) -> Report:
         """Return the diagnostic of the pair."""

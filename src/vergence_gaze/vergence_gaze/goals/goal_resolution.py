@@ -10,7 +10,7 @@ from vergence_gaze.estimation.directions import LARGEST_TANGENT, spread_of_eye
 from vergence_gaze.estimation.rays import gaze_of_ray, gaze_of_rays
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result
 from vergence_gaze.joints.shaft_history import ShaftHistory
-from vergence_gaze.parameters import GazeParameters
+from vergence_gaze.parameters import LONGEST_GOAL_S, GazeParameters
 from vergence_rig.geometry import EyeAngles, GeometryError, from_version_vergence
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
@@ -59,8 +59,9 @@ def resolve_goal(
 
     `fault` says why no joint is known, if none is.
     """
-    if not (math.isfinite(goal.time_limit_s) and goal.time_limit_s >= 0):
-        raise GoalError(Result.INVALID, f"time_limit_s must be 0 (default) or more [s]: got {goal.time_limit_s!r}")
+    if not 0 <= goal.time_limit_s <= LONGEST_GOAL_S:
+        allowed = f"time_limit_s must be 0 (default) to {LONGEST_GOAL_S:g} [s]"
+        raise GoalError(Result.INVALID, f"{allowed}: got {goal.time_limit_s!r}")
     if goal.kind is GoalKind.CLASS:
         if not goal.class_name:
             raise GoalError(Result.INVALID, "class_name must be one of the detector's classes: got an empty text")

@@ -1,9 +1,24 @@
 """A detected class as target: when to ask the tracker for what its boxes show."""
 
+import difflib
 import math
 
 from vergence_gaze.estimation.observations import BoxSighting
-from vergence_gaze.goals.goal import TrackRequest
+from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
+from vergence_rig.parameters import shown as shown_value
+
+_SHOWN = 20
+
+
+def check_class(goal: Goal, classes: tuple[str, ...] | None) -> None:
+    """Raise GoalError for a class that the detector does not look for; None: which it looks for is not known."""
+    if goal.kind is not GoalKind.CLASS or classes is None or goal.class_name in classes:
+        return
+    close = difflib.get_close_matches(goal.class_name, classes, n=1)
+    others = [name for name in classes if name not in close][: _SHOWN - len(close)]
+    shown = ", ".join([*close, *others]) + (", ..." if len(classes) > _SHOWN else "")
+    got = shown_value(goal.class_name)
+    raise GoalError(Result.INVALID, f"class_name must be one that the detector looks for ({shown}): got {got}")
 
 
 class RequestedClass:

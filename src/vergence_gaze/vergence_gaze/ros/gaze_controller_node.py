@@ -28,6 +28,7 @@ from vergence_gaze.ros.look_at_server import LookAtServer
 from vergence_gaze.ros.point_frames import PointFrames
 from vergence_msgs.msg import (
     BoxVergence,
+    DetectorClasses,
     EdgeVergence,
     EyeRotation,
     GazeState,
@@ -83,6 +84,7 @@ class GazeControllerNode(Node):
             BoxVergence, "vergence/box", lambda m: self._add(convert.box_sighting(m, self._images[0].fx_px))
         )
         watch.create_subscription(EyeRotation, "vergence/eye_rotation", lambda m: self._add(convert.eye_rotation(m)))
+        watch.create_subscription(DetectorClasses, "vergence/detector_classes", self._on_classes, latched)
         watch.create_subscription(PointStamped, "gaze/target", self._on_target)
         watch.create_subscription(CameraInfo, "left/camera_info", lambda m: self._on_camera(m, left=True))
         watch.create_subscription(CameraInfo, "right/camera_info", lambda m: self._on_camera(m, left=False))
@@ -112,6 +114,9 @@ class GazeControllerNode(Node):
 
     def _on_edge(self, message: EdgeVergence) -> None:
         self._add(convert.edge_contrast(message))
+
+    def _on_classes(self, message: DetectorClasses) -> None:
+        self._look_at.classes = tuple(message.names)
 
     def _on_target(self, message: PointStamped) -> None:
         stamp_s = to_seconds(message.header.stamp) or self._now_s()

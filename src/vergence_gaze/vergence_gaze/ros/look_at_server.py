@@ -10,6 +10,7 @@ from vergence_common.stamps import to_seconds
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.control.report import Command, GazeReport
 from vergence_gaze.goals.goal import Outcome, Result
+from vergence_gaze.goals.requested_class import check_class
 from vergence_gaze.ros import gaze_messages as convert
 from vergence_gaze.ros.point_frames import PointFrames
 from vergence_msgs.action import LookAt
@@ -17,12 +18,16 @@ from vergence_rig.eye_image import EyeImage
 
 
 class LookAtServer:
-    """Serves the action on a node; `images`, left and right, may be replaced at any time."""
+    """Serves the action on a node; `images`, left and right, may be replaced at any time.
+
+    So may `classes`, those that the detector looks for; None while that is not known.
+    """
 
     def __init__(
         self, node: Node, controller: GazeController, frames: PointFrames, images: tuple[EyeImage, EyeImage]
     ) -> None:
         self.images = images
+        self.classes: tuple[str, ...] | None = None
         self._node, self._controller, self._frames = node, controller, frames
         self._goals: dict[int, ServerGoalHandle] = {}
         self._outcomes: dict[bytes, Outcome] = {}
@@ -66,6 +71,7 @@ class LookAtServer:
             frame = request.header.frame_id
             place = self._frames.in_rig(request.point, frame, stamp_s) if is_point else (math.nan,) * 3
             goal = convert.goal(request, place, *self.images)
+            check_class(goal, self.classes)
         except ValueError as error:
             self._end(handle, Outcome(0, Result.INVALID, str(error), 0.0))
             return

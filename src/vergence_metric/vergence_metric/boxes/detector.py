@@ -86,6 +86,14 @@ class Detector:
         """Return the numbers of classes given by name or number, None for none; raises ModelClassError."""
         return _class_ids(wanted, self.class_names)
 
+    def classes_of(self, wanted: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the names of the classes that are looked for where these are wanted, all for none."""
+        ids = self.class_ids(wanted)
+        return self.class_names if ids is None else tuple(self._name(number) for number in ids)
+
+    def _name(self, number: int) -> str:
+        return self.class_names[number] if number < len(self.class_names) else str(number)
+
     def detect(self, image: NDArray[Any]) -> Detections:
         """Return the objects in an image (h, w, 3) BGR or (h, w) grey uint8; raises DetectorImageError for others."""
         colour = _colour(image)

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from vergence_metric.pairs.lasting_condition import LastingCondition
+
 Thumbnail = npt.NDArray[np.int16]
 
 _SIDE = 64  # samples along each side of the picture
-_PERSISTS_S = 0.5
-_LEAST_PAIRS = 3
 _BLACK, _WHITE = 12.0, 250.0
 _LEAST_TEXTURE = 2.0
 _NOISE_PAIRS = 5
@@ -27,23 +27,6 @@ class PictureFault:
 
 
 @dataclass(slots=True)
-class _Condition:
-    """Something that counts once it has held in several pairs for a while."""
-
-    since_s: float = math.nan
-    pairs: int = 0
-
-    def update(self, holds: bool, stamp_s: float) -> bool:
-        if not holds:
-            self.since_s, self.pairs = math.nan, 0
-            return False
-        self.pairs += 1
-        if self.pairs == 1:
-            self.since_s = stamp_s
-        return self.pairs >= _LEAST_PAIRS and stamp_s - self.since_s >= _PERSISTS_S
-
-
-@dataclass(slots=True)
 class _Eye:
     """One eye's last picture, and whether its camera has noise: only then are equal pictures a frozen camera's."""
 
@@ -51,9 +34,9 @@ class _Eye:
     last: Thumbnail | None = None
     change: Thumbnail | None = None
     noisy_pairs: int = 0
-    frozen: _Condition = field(default_factory=_Condition)
-    black: _Condition = field(default_factory=_Condition)
-    white: _Condition = field(default_factory=_Condition)
+    frozen: LastingCondition = field(default_factory=LastingCondition)
+    black: LastingCondition = field(default_factory=LastingCondition)
+    white: LastingCondition = field(default_factory=LastingCondition)
 
     def update(self, picture: Thumbnail, stamp_s: float) -> tuple[str, bool]:
         """Return what is wrong with the picture, "" if nothing is, and whether it is dark or saturated."""
@@ -93,13 +76,13 @@ class PictureMonitor:
         """Of the newest pair; None if nothing is wrong."""
         self._shapes: tuple[Any, ...] = ()
         self._stamp_s = -math.inf
-        self._eyes, self._same = (_Eye("left"), _Eye("right")), _Condition()
+        self._eyes, self._same = (_Eye("left"), _Eye("right")), LastingCondition()
 
     def update(self, stamp_s: float, left: npt.NDArray[Any], right: npt.NDArray[Any]) -> PictureFault | None:
         """Return what is wrong with a pair, (h, w, 3) BGR or (h, w) grey uint8; None if nothing is."""
         if (left.shape, right.shape) != self._shapes or not stamp_s > self._stamp_s:
             self._shapes = left.shape, right.shape
-            self._eyes, self._same = (_Eye("left"), _Eye("right")), _Condition()
+            self._eyes, self._same = (_Eye("left"), _Eye("right")), LastingCondition()
         self._stamp_s = stamp_s
         pictures = _thumbnail(left), _thumbnail(right)
         same = self._same.update(self._in_both(*pictures), stamp_s)

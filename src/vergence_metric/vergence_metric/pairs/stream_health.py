@@ -1,10 +1,16 @@
 """Health of a stream of images: rate, age, images refused, and one sentence of status."""
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from statistics import median
 
 _RECENT = 90
+LEAST_RATE_HZ = 5.0
+"""Rate by the stamps below which nothing can be followed or paired in time [Hz]."""
+_SLOW_INTERVALS = 3
+_STAMPS = 20
+_AGE_S = (-0.25, 1.0)
 
 
 @dataclass(frozen=True)
@@ -28,21 +34,27 @@ class StreamHealth:
         self._last_s = self._started_s = now_s
         self._arrivals_s: deque[float] = deque(maxlen=_RECENT)
         self._ages_s: deque[float] = deque(maxlen=_RECENT)
+        self._stamp_s = math.nan
+        self._intervals_s: deque[float] = deque(maxlen=_STAMPS)
 
-    def accept(self, now_s: float, age_s: float, size_px: tuple[int, int]) -> None:
+    def accept(self, now_s: float, age_s: float, size_px: tuple[int, int], stamp_s: float = math.nan) -> None:
         """Count a usable image of (width, height)."""
         self.decoded(size_px)
-        self.count(now_s, age_s)
+        self.count(now_s, age_s, stamp_s)
 
     def decoded(self, size_px: tuple[int, int]) -> None:
         """Record that a counted image could be decoded, and its (width, height)."""
         self.size_px = size_px
         self._refusal = None
 
-    def count(self, now_s: float, age_s: float) -> None:
-        """Count an image that has arrived, decoded or not."""
+    def count(self, now_s: float, age_s: float, stamp_s: float = math.nan) -> None:
+        """Count an image that has arrived, decoded or not, with its stamp on the clock of the images [s]."""
         if now_s - self._last_s > 1.0:
             self._arrivals_s.clear()  # no rate over a gap
+            self._ages_s.clear()
+        if math.isfinite(stamp_s - self._stamp_s):
+            self._intervals_s.append(stamp_s - self._stamp_s)
+        self._stamp_s = stamp_s
         self.received += 1
         self._last_s = now_s
         self._arrivals_s.append(now_s)
@@ -83,4 +95,25 @@ class StreamHealth:
             return StreamStatus(False, f"{self.topic}: {self._refusal}", values | {"publishers": publishers})
         if publishers > 1:
             return StreamStatus(False, f"{self.topic} must have one publisher: got {publishers}", values)
+        fault = self._fault_of_stamps()
+        if fault:
+            return StreamStatus(False, f"{self.topic}: {fault}", values)
         return StreamStatus(True, f"{self.topic}: {self.rate_hz or 0.0:.1f} Hz", values)
+
+    def _fault_of_stamps(self) -> str:
+        """Return what is wrong with the stamps, "" if nothing is."""
+        intervals_s = list(self._intervals_s)
+        stuck = sum(interval_s <= 0 for interval_s in intervals_s)
+        if len(intervals_s) >= _SLOW_INTERVALS and 2 * stuck > len(intervals_s):
+            what = "they are zero" if self._stamp_s == 0 else f"{stuck} of the last {len(intervals_s)} do not"
+            return f"stamps must increase from image to image: {what}"
+        if len(intervals_s) >= _SLOW_INTERVALS:
+            interval_s = median(intervals_s[-_SLOW_INTERVALS:])
+            if interval_s > 1.0 / LEAST_RATE_HZ:
+                return f"the camera is slower than needed: {1 / interval_s:.1f} Hz, at least {LEAST_RATE_HZ:g} Hz"
+        if len(self._ages_s) >= _SLOW_INTERVALS:
+            age_s = median(list(self._ages_s)[-_STAMPS:])
+            if not _AGE_S[0] <= age_s <= _AGE_S[1]:
+                late = f"{age_s:.3g} s old" if age_s > 0 else f"{-age_s:.3g} s ahead of the clock"
+                return f"by their stamps images are {late}: the camera's and this node's clocks or use_sim_time differ"
+        return ""

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from rclpy.qos import QoSDurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
@@ -33,7 +34,7 @@ from vergence_metric.ros.box_messages import (
 )
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import IdealPair, ImagePair, StereoInput
-from vergence_msgs.msg import BoxVergence, StereoDetections
+from vergence_msgs.msg import BoxVergence, DetectorClasses, StereoDetections
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.parameters import ParameterError
 from vergence_rig.rig_file import load_rig
@@ -61,6 +62,10 @@ class BoxMetricNode(MetricNode):
         self._point_publisher = self._output(qos, PoseWithCovarianceStamped, "vergence/target_point")
         self._detections_publisher = self._output(qos, StereoDetections, "vergence/detections")
         self._overlay_publisher = self._output(qos, Image, "vergence/box_overlay", IMAGE_QOS)
+        latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
+        self._classes_publisher = qos.create_publisher(DetectorClasses, "vergence/detector_classes", latched)
+        self._classes: tuple[str, ...] | None = None
+        self._publish_classes()
         vision = vision_type()
         self._vision_publishers = [
             self._output(qos, vision, f"vergence/{eye}_detections") for eye in EYES if vision is not None
@@ -85,7 +90,15 @@ class BoxMetricNode(MetricNode):
         except DetectorError as error:
             raise ParameterError("detector.classes", classes, f"classes of the model ({error})") from None
 
+    def _publish_classes(self) -> None:
+        classes = self._measurement.detector.classes_of(self._settings.get(DetectorParameters).classes)
+        if classes != self._classes:
+            self._classes = classes
+            header = Header(stamp=self.get_clock().now().to_msg())
+            self._classes_publisher.publish(DetectorClasses(header=header, names=list(classes)))
+
     def _on_settings(self, settings: ParameterSet) -> None:
+        self._publish_classes()
         limit_threads(settings.value.threads)
         self._metric_parameters = _parameters_of(settings)
         self._stereo.set_parameters(settings.value, settings.get(PairingParameters))

@@ -1,5 +1,6 @@
 """edge_metric_node: pairs of images in, metric I, the signed error of the fovea and the followed target out."""
 
+import math
 from collections.abc import Sequence
 from time import monotonic_ns
 from typing import Any
@@ -20,6 +21,7 @@ from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.measurement.overlay import draw_overlay
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import GROUPS, PairMeasurementParameters, VergedParameters
+from vergence_metric.pairs.eye_order import EyeOrderMonitor
 from vergence_metric.pairs.ideal_images import Models
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
@@ -45,7 +47,7 @@ class EdgeMetricNode(MetricNode):
         limit_threads(stereo.threads)
         self._rig = load_rig(stereo.rig)
         self._measurement = PairMeasurement(_measurement_parameters(self._settings), self._rig)
-        self._pictures = PictureMonitor()
+        self._pictures, self._order = PictureMonitor(), EyeOrderMonitor()
         diagnostics = Diagnostics(self)
         qos = watch_qos(self, diagnostics)
         self._edge_publisher = self._output(qos, EdgeVergence, "vergence/edge")
@@ -82,6 +84,8 @@ class EdgeMetricNode(MetricNode):
         with self._times.measure("ideal_images"):
             ideal = self._stereo.ideal(pair, grey=True)
         models = ideal.cameras
+        with self._times.measure("pictures"):
+            self._update_order(pair, ideal)
         with self._times.measure("metric"):
             edge = self._measurement.edge(ideal.left, ideal.right)
         if self._edge_publisher.get_subscription_count() or self._error_publisher.get_subscription_count():
@@ -96,6 +100,13 @@ class EdgeMetricNode(MetricNode):
                 self._overlay_publisher.publish(array_to_image(picture, header))
         self._measurement.update_alignment()
         self._failure = None
+
+    def _update_order(self, pair: ImagePair, ideal: IdealPair) -> None:
+        eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
+        vergence_rad = math.nan if eyes is None else eyes.vergence_rad
+        focal_px = math.nan if ideal.cameras is None else ideal.cameras[0].fx_px
+        stamp_s = pair.left_stamp_ns * 1e-9
+        self._order.update(stamp_s, ideal.left, ideal.right, vergence_rad, focal_px)
 
     def _publish_unusable(self, reason: str, header: Header, pair_skew_s: float) -> None:
         estimator = self._settings.get(DisparityParameters).estimator
@@ -136,6 +147,8 @@ class EdgeMetricNode(MetricNode):
 
     def _report_pictures(self) -> Report:
         fault = self._pictures.fault
+        if fault is None and self._order.fault:
+            return Report(ERROR, self._order.fault)
         if fault is None:
             return Report(OK, "the pictures are neither frozen, nor the same in both eyes, nor black or white")
         return Report(ERROR, f"{fault.reason}{'; nothing is measured' if fault.unusable else ''}")

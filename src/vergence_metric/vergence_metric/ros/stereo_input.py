@@ -175,14 +175,15 @@ class StereoInput:
 
     def _on_frame(self, side: int, frame: ImageFrame, age_s: float) -> None:
         now_ns = frame.arrived_ns
-        self._health[side].accept(now_ns * 1e-9, age_s, (frame.pixels.shape[1], frame.pixels.shape[0]))
-        self._emit(self._pairer.add(side, to_nanoseconds(frame.header.stamp), frame, now_ns))
+        stamp_ns, size_px = to_nanoseconds(frame.header.stamp), (frame.pixels.shape[1], frame.pixels.shape[0])
+        self._health[side].accept(now_ns * 1e-9, age_s, size_px, stamp_ns * 1e-9)
+        self._emit(self._pairer.add(side, stamp_ns, frame, now_ns))
 
     def _on_image(self, side: int, message: Any) -> None:
         now_ns, age_s = monotonic_ns(), self._age_s(message.header)
         if self._is_due is not None and self._images is None:
             stamp_ns = to_nanoseconds(message.header.stamp)
-            self._health[side].count(now_ns * 1e-9, age_s)
+            self._health[side].count(now_ns * 1e-9, age_s, stamp_ns * 1e-9)
             self._emit(self._pairer.add(side, stamp_ns, _Undecoded(message, now_ns), now_ns))
             return
         frame = self._decoded(side, message, now_ns)

@@ -24,6 +24,7 @@ _WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context 
 _WIDE_REACH_PX = 16  # that parallax may move the point beside it
 _CONTEXT_HALF_PX, _CONTEXT_SCALE = 48, 2  # on photographs the smallest that rarely errs
 _POINT_HALF_PX = 16
+_ALONE_LEAD = 0.3  # in correlation, over any other place: without its surroundings a point must be unmistakable
 _CANDIDATES = 3
 _APART_PX = 12.0  # two peaks of the context closer than this are one place
 _REFINED_WITHIN_PX = 4
@@ -59,14 +60,10 @@ class RememberedPatch:
 
     def find(self, image: Image, view: EyeView, direction: NDArray[np.float64], reach_px: int) -> PatchSighting | None:
         """Return where it is, expected within `reach_px` of `direction` (3,) in rig_base; None outside the image."""
-        expected, reach = view.pixel(direction), max(reach_px, _WIDE_REACH_PX)
-        prior = _PRIOR * (reach / max(reach_px, 1)) ** 2
-        height, width = image.shape
+        expected, height, width = view.pixel(direction), *image.shape
         if not (-reach_px <= expected[0] < width + reach_px and -reach_px <= expected[1] < height + reach_px):
             return None
-        wide, wide_spread_px = self._places(image, view, expected, reach, (_WIDE_HALF_PX, _WIDE_SCALE), 1, prior)
-        if wide and wide[0][1] >= _WIDE_SIMILARITY:
-            expected, reach, prior = wide[0][0], _WIDE_REACH_PX, _WIDE_PRIOR
+        expected, reach, prior, wide_spread_px = self._about(image, view, expected, reach_px)
         size = (_CONTEXT_HALF_PX, _CONTEXT_SCALE)
         places, spread_px = self._places(image, view, expected, reach, size, _CANDIDATES, prior)
         if not places:
@@ -79,6 +76,29 @@ class RememberedPatch:
             found.append((similarity + at_point - prior * off**2, similarity, at_point, pixel))
         _, similarity, at_point, pixel = max(found)
         return PatchSighting(pixel, similarity, at_point, min(spread_px, wide_spread_px))
+
+    def find_alone(
+        self, image: Image, view: EyeView, direction: NDArray[np.float64], reach_px: int
+    ) -> PatchSighting | None:
+        """Return where the point itself is, whatever surrounds it now; None unless it is unmistakable.
+
+        A lens that lies off the axes moves as the eye turns: what stands near has another background then.
+        """
+        expected, reach, prior, _ = self._about(image, view, view.pixel(direction), reach_px)
+        places, spread_px = self._places(image, view, expected, reach, (_POINT_HALF_PX, 1), 2, prior)
+        best, second = [*(similarity for _, similarity in places), 0.0, 0.0][:2]
+        if second > best - _ALONE_LEAD:
+            return None
+        return PatchSighting(places[0][0], best, best, spread_px)
+
+    def _about(self, image: Image, view: EyeView, expected: Pixel, reach_px: int) -> tuple[Pixel, int, float, float]:
+        """Return where to search the point, how far and at which prior, by the wide view; the last is its spread."""
+        reach = max(reach_px, _WIDE_REACH_PX)
+        prior = _PRIOR * (reach / max(reach_px, 1)) ** 2
+        wide, spread_px = self._places(image, view, expected, reach, (_WIDE_HALF_PX, _WIDE_SCALE), 1, prior)
+        if wide and wide[0][1] >= _WIDE_SIMILARITY:
+            return wide[0][0], _WIDE_REACH_PX, _WIDE_PRIOR, spread_px
+        return expected, reach, prior, spread_px
 
     def refine(self, image: Image, view: EyeView, pixel: Pixel, reach_px: int) -> tuple[PatchSighting, float]:
         """Return where the point itself is within `reach_px` of a pixel, and its similarity at that pixel.

@@ -116,6 +116,9 @@ def find_by_surroundings(
     if found is None:
         return None
     alike = found.similarity >= p.request_similarity
+    if not alike and target.hidden:
+        found = patch.find_alone(left, view, target.direction, round(reach_px)) or found
+        alike = found.similarity >= p.request_similarity
     if target.found and not (alike and (target.hidden or found.at_point >= p.anchor_similarity)):
         return None
     if alike and target.hidden:

@@ -66,7 +66,7 @@ class ServoNode(Node):
         self._guardians: Guardians | None = None
         try:
             if values.guardian:
-                self._guardians = Guardians(self._drivers, channels)
+                self._guardians = Guardians(self._drivers, channels, values.guardian_timeout_s)
             self._pose_file = expanded(values.pose_file) if values.pose_file else default_pose_file()
             self._pose = read_pose(self._pose_file)
             self._head = ServoHead(
@@ -126,9 +126,17 @@ class ServoNode(Node):
         )
         # Servos are real also beside simulated time: their time-outs must not stand with /clock.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0 / values.update_rate_hz, lambda: self._head.step(time.monotonic()), clock=steady)
+        self.create_timer(1.0 / values.update_rate_hz, self._step, clock=steady)
         self.create_timer(1.0 / values.state_rate_hz, self._publish_state, clock=steady)
         self.create_timer(1.0, self._check_commanders, clock=steady)
+
+    def _step(self) -> None:
+        now_s = time.monotonic()
+        pause_s = 0.0 if self._guardians is None else self._guardians.beat(now_s)
+        if pause_s:
+            self.get_logger().error(f"this node hung for {pause_s:.1f} s: its guardian has released the servos")
+            self._head.release(now_s)
+        self._head.step(now_s)
 
     @staticmethod
     def _report_channel(channel: ServoChannel) -> Report:
@@ -229,7 +237,7 @@ class ServoNode(Node):
         if self._head.pulsing and limit_s > 0:
             self._head.park(time.monotonic(), only_pulsing=True)
             while not self._head.parked and time.monotonic() < deadline_s:
-                self._head.step(time.monotonic())
+                self._step()
                 time.sleep(0.005)
         self._save_pose()
         self._head.release(time.monotonic())

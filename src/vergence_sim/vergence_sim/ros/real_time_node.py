@@ -17,6 +17,7 @@ from vergence_common.node_main import StartAbandonedError
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_common.stamps import to_nanoseconds, to_stamp
+from vergence_rig.head_bodies import OPTICAL_FRAMES
 from vergence_rig.parameters import Groups
 from vergence_rig.rig import JOINT_NAMES
 from vergence_sim.clock_parameters import ClockParameters
@@ -58,7 +59,7 @@ class RealTimeNode(Node):
         self._published = dict.fromkeys(EYES, 0)
         self._reported_speeds, self._true_speeds = JointSpeeds(), JointSpeeds()
         self._dropped = 0
-        self._refused: list[str] = []
+        self._refused, self._refusal = 0, ""
         self._stop = threading.Event()
         self._started = threading.Event()
         self._failure: BaseException | None = None
@@ -113,7 +114,7 @@ class RealTimeNode(Node):
         self._add_action(lambda world, _: action(world))
 
     def _refuse(self, reason: str) -> None:
-        self._refused.append(reason)
+        self._refused, self._refusal = self._refused + 1, reason
         self.get_logger().warning(f"command refused, nothing moves: {reason}", throttle_duration_sec=1.0)
 
     def _add_action(self, action: Callable[[Any, float], None]) -> None:
@@ -215,7 +216,7 @@ class RealTimeNode(Node):
             if self._true_joints.get_subscription_count():
                 self._true_joints.publish(joint_state(stamp, true, true_speeds))
             return
-        header = Header(stamp=stamp, frame_id=f"{event.eye}_camera_optical_frame")
+        header = Header(stamp=stamp, frame_id=OPTICAL_FRAMES[event.eye])
         picture = self._image_pool.submit(world.expose(event.eye))
         info = camera_info(header, world.lenses[event.eye].camera, world.calibrations[event.eye])
         latency_s = world.parameters.camera.latency_s
@@ -248,8 +249,8 @@ class RealTimeNode(Node):
 
     def _report_commands(self) -> Report:
         if self._refused:
-            values = {"refused": len(self._refused), "joints": ", ".join(JOINT_NAMES)}
-            return Report(WARN, f"{len(self._refused)} commands refused, the last: {self._refused[-1]}", values)
+            values = {"refused": self._refused, "joints": ", ".join(JOINT_NAMES)}
+            return Report(WARN, f"{self._refused} commands refused, the last: {self._refusal}", values)
         return Report(OK, "no command refused")
 
 

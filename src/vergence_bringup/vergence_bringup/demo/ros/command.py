@@ -7,11 +7,10 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import Any
-
-import yaml
 
 from vergence_bringup.demo.photo_report import write_overview
 from vergence_bringup.demo.photographs import CLICKS, SHORT_CLICKS, Photographs, open_photographs
@@ -25,8 +24,11 @@ from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
 from vergence_rig.regular_file import expanded
-from vergence_rig.rig import Rig
-from vergence_rig.rig_file import load_rig
+from vergence_rig.rig import Joints, Rig
+from vergence_rig.rig_file import load_rig, write_rig
+from vergence_rig.servo import IDEAL
+from vergence_sim.heads import HeadParameters
+from vergence_sim.heads import simulated_head as simulated_rig
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the demo; 0 only if every station was reported verged and the ground truth agrees."""
-    rig = load_rig(config_dir() / "rig.yaml")
+    rig = _described_rig(options.ideal)
     short = options.short and not options.station
     photographs: Photographs | None = None
     if options.photos is not None:
@@ -82,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station], photographs: Photographs | None) -> int:
     started = time.monotonic()
     results: list[StationResult] = []
-    commands = _commands(options, photographs)
+    commands = _commands(options, rig, photographs)
     _say(f"starting {', '.join(commands)} (logs in {options.out / 'log'})")
     with ProcessGroup(log_dir=options.out / "log") as processes:
         for name, command in commands.items():
@@ -137,24 +139,23 @@ def _runner(
         recorder.close()
 
 
-def _commands(options: argparse.Namespace, photographs: Photographs | None) -> dict[str, NodeCommand]:
-    rig = _ideal_rig(options.out) if options.ideal else config_dir() / "rig.yaml"
+def _commands(options: argparse.Namespace, rig: Rig, photographs: Photographs | None) -> dict[str, NodeCommand]:
+    path = (options.out / "rig.yaml").resolve()
+    write_rig(path, rig)
     world: dict[str, object] = {"seed": options.seed, "preset": "ideal" if options.ideal else "realistic"}
     simulated_time = not options.real_time
     if photographs is None:
-        return simulated_head(rig, simulated_time=simulated_time, **world)
-    return simulated_head(rig, PHOTOGRAPHED, simulated_time=simulated_time, **world, **photographs.parameters)
+        return simulated_head(path, simulated_time=simulated_time, **world)
+    return simulated_head(path, PHOTOGRAPHED, simulated_time=simulated_time, **world, **photographs.parameters)
 
 
-def _ideal_rig(out_dir: Path) -> Path:
-    """Write the shipped rig with ideal servos, so that the controller assumes no play."""
-    rig = yaml.safe_load((config_dir() / "rig.yaml").read_text(encoding="utf-8"))
-    for joint in rig["joints"].values():
-        joint["servo"] = "ideal"
-    path = out_dir / "rig_ideal.yaml"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(yaml.safe_dump(rig), encoding="utf-8")
-    return path.resolve()
+def _described_rig(ideal: bool) -> Rig:
+    """Return what the nodes are given of the simulated head: its own description, or an ideal one without play."""
+    rig = load_rig(config_dir() / "rig.yaml")
+    if not ideal:
+        return simulated_rig(HeadParameters(), rig)
+    joints = (replace(joint, servo=IDEAL) for _, joint in rig.joints.items())
+    return replace(rig, joints=Joints(*joints))
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -42,6 +42,12 @@ class GridLayout(Layout):
         """Return whether scores are at most 1 and boxes are centres and sizes in pixels."""
         return self._scores_are_shares(warm_up) and self._in_pixels(warm_up)
 
+    def explains(self, output: Output, warm_up: WarmUp) -> bool:
+        """Return whether an output is the map of one stride before decoding: the grid's sides stand in its shape."""
+        sides = {tuple(math.ceil(side / s) for side in reversed(warm_up.input_px)) for s in self.strides}
+        pairs = {tuple(output.shape[i : i + 2]) for i in range(1, output.ndim - 1)}
+        return output.ndim in (4, 5) and not pairs.isdisjoint(sides)
+
     def decode(self, outputs: Sequence[Output], input_px: tuple[int, int], threshold: float) -> Candidates:
         """Return the rows' best classes whose score reaches the threshold; see Layout."""
         rows, first = self.rows(outputs[0][0]), self._first_class()

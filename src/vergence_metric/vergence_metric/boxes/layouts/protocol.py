@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.boxes.errors import DetectorError
 from vergence_metric.boxes.preprocessing import Preprocessing
 
 Array = NDArray[np.float64]
@@ -79,6 +80,10 @@ class Layout(ABC):
         """Return how an image becomes the input (of element type `dtype`), unless the parameters override it."""
         return Preprocessing("rgb", dtype != np.uint8, "letterbox")
 
+    def explains(self, output: Output, warm_up: WarmUp) -> bool:
+        """Return whether an output that `decode` does not need repeats those that it does, as before decoding."""
+        return False
+
     @abstractmethod
     def decode(self, outputs: Sequence[Output], input_px: tuple[int, int], threshold: float) -> Candidates:
         """Return the candidates of one image; those below the score `threshold` may be left out already.
@@ -98,11 +103,25 @@ class Layout(ABC):
             input_px: (width, height) of the input.
             threshold: least score.
 
+        Raises:
+            DetectorError: an output that is not a number: it says nothing of what is seen.
+
         """
-        found = self.decode([outputs[i] for i in self.outputs], input_px, threshold)
+        used = [outputs[i] for i in self.outputs]
+        self.check_numbers(used)
+        found = self.decode(used, input_px, threshold)
         good = (found.scores >= threshold) & np.isfinite(found.xyxy).all(1) & np.isfinite(found.scores)
         good &= (found.xyxy[:, 2:] > found.xyxy[:, :2]).all(1)
         return Candidates(found.xyxy[good], found.scores[good], found.class_ids[good])
+
+    def check_numbers(self, outputs: Sequence[Output]) -> None:
+        """Raise DetectorError where one of the outputs that `decode` needs holds NaN."""
+        for place, output in zip(self.outputs, outputs, strict=True):
+            if output.dtype.kind == "f" and np.isnan(output).any():
+                share = float(np.isnan(output).mean())
+                raise DetectorError(
+                    f"output {place} of the model must be numbers: {share:.0%} of {list(output.shape)} are NaN"
+                )
 
     def __str__(self) -> str:
         count = "" if self.classes is None else f", {self.classes} class{'' if self.classes == 1 else 'es'}"

@@ -1,6 +1,6 @@
 """Which registered layout a model has: by metadata, output names, and shapes and values of its warm-up run."""
 
-from vergence_metric.boxes.errors import ModelLayoutError
+from vergence_metric.boxes.errors import DetectorError, ModelLayoutError
 from vergence_metric.boxes.layouts.protocol import Layout, WarmUp
 from vergence_metric.boxes.layouts.registry import layout_names, registered_layouts
 
@@ -21,14 +21,21 @@ def find_layout(warm_up: WarmUp, wanted: str = AUTO) -> Layout:
     task = warm_up.metadata.get("task", "detect")
     if task != "detect":
         raise ModelLayoutError(f"the model's task must be 'detect': got {task!r}")
-    fitting = _fitting(warm_up)
+    matching = _fitting(warm_up)
+    fitting = [layout for layout in matching if not _unexplained(layout, warm_up)]
     named = wanted if wanted != AUTO else warm_up.metadata.get("layout")
     for layout in fitting:
         if layout.name == named:
-            return layout
+            return _checked(layout, warm_up)
     shapes = ", ".join(
         f"{name} {list(output.shape)}" for name, output in zip(warm_up.output_names, warm_up.outputs, strict=True)
     )
+    if matching and not fitting:
+        layout = next((layout for layout in matching if layout.name == named), matching[0])
+        raise ModelLayoutError(
+            f"every output of the model must be explained: {', '.join(_unexplained(layout, warm_up))} is no part of "
+            f"the layout {layout.name!r} ({layout.description}), which the outputs {shapes} would fit otherwise"
+        )
     if wanted != AUTO:
         raise ModelLayoutError(f"the model's outputs must have the layout {wanted!r}: got {shapes}")
     width, height = warm_up.input_px
@@ -43,7 +50,25 @@ def find_layout(warm_up: WarmUp, wanted: str = AUTO) -> Layout:
         raise ModelLayoutError(
             f"the model's outputs {shapes} could be {names}: say which by the parameter 'detector.layout'"
         )
-    return agreeing[0]
+    return _checked(agreeing[0], warm_up)
+
+
+def _checked(layout: Layout, warm_up: WarmUp) -> Layout:
+    try:
+        layout.check_numbers([warm_up.outputs[i] for i in layout.outputs])
+    except DetectorError as error:
+        raise ModelLayoutError(f"{error} (for a grey picture)") from error
+    return layout
+
+
+def _unexplained(layout: Layout, warm_up: WarmUp) -> list[str]:
+    """Return name and shape of every output that the layout neither needs nor explains."""
+    named = zip(warm_up.output_names, warm_up.outputs, strict=True)
+    return [
+        f"{name} {list(output.shape)}"
+        for i, (name, output) in enumerate(named)
+        if i not in layout.outputs and not layout.explains(output, warm_up)
+    ]
 
 
 def _fitting(warm_up: WarmUp) -> list[Layout]:

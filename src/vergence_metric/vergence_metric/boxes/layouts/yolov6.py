@@ -33,6 +33,13 @@ class YoloV6EndToEnd(Layout):
             return None
         return cls(tuple(names.index(name) for name in _END_TO_END_NAMES), warm_up.class_count)
 
+    def check_numbers(self, outputs: Sequence[Output]) -> None:
+        """See Layout: of the rows that count."""
+        count, *rows = outputs
+        n = int(np.asarray(count).reshape(-1)[0])
+        boxes, scores, classes = (np.asarray(values).reshape(-1) for values in rows)
+        super().check_numbers([count, boxes[: 4 * n], scores[:n], classes[:n]])
+
     def decode(self, outputs: Sequence[Output], input_px: tuple[int, int], threshold: float) -> Candidates:
         """Return the first num_dets rows; see Layout."""
         count, boxes, scores, classes = outputs
