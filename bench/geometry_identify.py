@@ -9,13 +9,17 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 
+from bench.bench_photos import outcomes_of
 from bench.results import Row
+from vergence_calibration.geometry.geometry_report import geometry_record
 from vergence_calibration.geometry.identify_geometry import FoundGeometry, Look, identify_geometry
 from vergence_calibration.geometry.poses import PoseParameters
 from vergence_calibration.identification.axis_log import EYES, EyeCamera, IdentifyParameters, stair_moves, step_moves
+from vergence_calibration.identification.identified_rig import rig_text
 from vergence_calibration.identification.seen_motion import shrunk
 from vergence_calibration.lost_motion import staircase
 from vergence_rig.camera import CameraModel
@@ -80,19 +84,20 @@ def identified(seed: int) -> tuple[FoundGeometry, Rig, float]:
         return found, head.truth, computing_s + head.simulator.time_s + _timing_moves_s()
 
 
-def run(say: Callable[[str], None]) -> list[Row]:
-    """Identify every head and return the rows."""
-    errors, before, took_s = [], [], []
+def run(say: Callable[[str], None], folder: Path) -> list[Row]:
+    """Identify every head, write FOLDER/head_SEED.yaml, and return the rows."""
+    folder.mkdir(parents=True, exist_ok=True)
+    errors, before = [], []
     ratios: list[float] = []
-    for seed in HEADS:
-        found, truth, took = identified(seed)
+    outcomes = outcomes_of(identified, list(HEADS), 1, "heads identified", say)
+    for seed, (found, truth, _) in zip(HEADS, outcomes, strict=True):
+        (folder / f"head_{seed}.yaml").write_text(rig_text(found.rig, geometry_record(found), "the benchmark's time"))
         errors.append(errors_of(found.rig, truth))
         before.append(errors_of(default_rig(), truth))
         ratios += _ratios(found, truth)
-        took_s.append(took)
         say(f"head {seed}: " + ", ".join(f"{name} {value:.3g}" for name, value in errors[-1].items()))
     units = {"lens_mm": "mm", "tilt_axis_mm": "mm", "mount_deg": "deg", "zero_deg": "deg", "principal_px": "px"}
-    rows = [Row("geometry.identify_s", float(np.median(took_s)), "s")]
+    rows = [Row("geometry.identify_s", float(np.median([took_s for _, _, took_s in outcomes])), "s")]
     for name in errors[0]:
         found_error, start_error = (float(np.median([one[name] for one in some])) for some in (errors, before))
         rows.append(Row(f"geometry.{name}", found_error, units.get(name, "1"), _UNCALIBRATED, start_error))
