@@ -1,4 +1,4 @@
-"""Whether what a head saw, and what was found from it, can be used: an IdentifyError for each way in which it cannot."""
+"""Whether what a head saw, and what was found from it, can be used: an IdentifyError for each way in which not."""
 
 import math
 from collections.abc import Sequence
