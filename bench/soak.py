@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PointStamped
 from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -70,7 +70,7 @@ class Goals:
         self.node = Node("soak", context=context)
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
-        self._pose = self.node.create_publisher(PoseStamped, "sim/target_pose", 10)
+        self._pose = self.node.create_publisher(PointStamped, "sim/target_pose", 10)
         self._client = ActionClient(self.node, LookAt, "gaze/look_at")
         self._random = np.random.default_rng(0)
 
@@ -83,11 +83,10 @@ class Goals:
         """Look at a new place; return whether the eyes verged on it within the period."""
         end_s = time.monotonic() + PERIOD_S
         x, y, z = (float(v) for v in self._random.uniform((0.45, -0.12, -0.06), (0.9, 0.12, 0.06)))
-        pose = PoseStamped()
-        pose.header.frame_id = "rig_base"
-        pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = x, y, z
-        pose.pose.orientation.w = 1.0
-        self._pose.publish(pose)
+        place = PointStamped()
+        place.header.frame_id = "rig_base"
+        place.point.x, place.point.y, place.point.z = x, y, z
+        self._pose.publish(place)
         goal = LookAt.Goal(kind=LookAt.Goal.POINT, time_limit_s=PERIOD_S - 0.5)
         goal.header.frame_id = "rig_base"
         goal.point.x, goal.point.y, goal.point.z = x, y, z
