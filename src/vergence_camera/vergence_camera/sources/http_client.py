@@ -180,4 +180,5 @@ def shown_url(url: str) -> str:
     """Return the address without its user and password, also where the query has them, as many cameras want it."""
     scheme, _, rest = url.partition("://")
     host, slash, path = rest.partition("/")
-    return f"{scheme}://{host.rpartition('@')[2]}{slash}{_SECRET.sub(r'\1...', path)}"
+    shown = _SECRET.sub(r"\1...", path)
+    return f"{scheme}://{host.rpartition('@')[2]}{slash}{shown}"
