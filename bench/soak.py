@@ -105,14 +105,16 @@ class Goals:
             self._executor.spin_once(timeout_sec=min(0.2, max(end_s - time.monotonic(), 0.0)))
 
 
-def segments() -> set[str]:
-    """Return the names of the middleware's shared-memory segments on this machine."""
-    return {name for name in os.listdir(_SHM) if name.startswith(("fastrtps_", "fastdds_"))} if _SHM.is_dir() else set()
+def segments(pid: int | str) -> set[Path]:
+    """Return the shared-memory segments that a process has mapped: its own, and those of the graph that it reads."""
+    lines = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace").splitlines()
+    paths = (line.split(maxsplit=5)[5] for line in lines if f"{_SHM}/" in line)
+    return {Path(path) for path in paths if not path.endswith("(deleted)")}
 
 
 def run(duration_s: float) -> list[Row]:
     """Run the soak and return its rows."""
-    before = segments()
+    mapped: set[Path] = set()
     with own_domain() as domain:
         commands = simulated_head(config_dir() / "rig.yaml", preset="realistic")
         with ProcessGroup(results.OUT_DIR / "soak_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes:
@@ -122,8 +124,9 @@ def run(duration_s: float) -> list[Row]:
             context = Context()
             rclpy.init(args=[], context=context, domain_id=domain)
             samples, verged = _soak(Goals(context), nodes, duration_s)
+            mapped = segments("self").union(*(segments(nodes.pid(name)) for name in NODES))
             context.try_shutdown()
-    left = len(segments() - before)
+    left = sum(path.exists() for path in mapped)
     for name, of_node in samples.items():
         print(
             f"   {name}: {of_node.rss_mb[0]:.0f} to {of_node.rss_mb[-1]:.0f} MB, {of_node.slope_mb_h():+.1f} MB/h, "
