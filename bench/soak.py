@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PointStamped
 from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -70,7 +70,7 @@ class Goals:
         self.node = Node("soak", context=context)
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
-        self._pose = self.node.create_publisher(PoseStamped, "sim/target_pose", 10)
+        self._pose = self.node.create_publisher(PointStamped, "sim/target_pose", 10)
         self._client = ActionClient(self.node, LookAt, "gaze/look_at")
         self._random = np.random.default_rng(0)
 
@@ -83,11 +83,10 @@ class Goals:
         """Look at a new place; return whether the eyes verged on it within the period."""
         end_s = time.monotonic() + PERIOD_S
         x, y, z = (float(v) for v in self._random.uniform((0.45, -0.12, -0.06), (0.9, 0.12, 0.06)))
-        pose = PoseStamped()
-        pose.header.frame_id = "rig_base"
-        pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = x, y, z
-        pose.pose.orientation.w = 1.0
-        self._pose.publish(pose)
+        place = PointStamped()
+        place.header.frame_id = "rig_base"
+        place.point.x, place.point.y, place.point.z = x, y, z
+        self._pose.publish(place)
         goal = LookAt.Goal(kind=LookAt.Goal.POINT, time_limit_s=PERIOD_S - 0.5)
         goal.header.frame_id = "rig_base"
         goal.point.x, goal.point.y, goal.point.z = x, y, z
@@ -106,14 +105,16 @@ class Goals:
             self._executor.spin_once(timeout_sec=min(0.2, max(end_s - time.monotonic(), 0.0)))
 
 
-def segments() -> set[str]:
-    """Return the names of the middleware's shared-memory segments on this machine."""
-    return {name for name in os.listdir(_SHM) if name.startswith(("fastrtps_", "fastdds_"))} if _SHM.is_dir() else set()
+def segments(pid: int | str) -> set[Path]:
+    """Return the shared-memory segments that a process has mapped: its own, and those of the graph that it reads."""
+    lines = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace").splitlines()
+    paths = (line.split(maxsplit=5)[5] for line in lines if f"{_SHM}/" in line)
+    return {Path(path) for path in paths if not path.endswith("(deleted)")}
 
 
 def run(duration_s: float) -> list[Row]:
     """Run the soak and return its rows."""
-    before = segments()
+    mapped: set[Path] = set()
     with own_domain() as domain:
         commands = simulated_head(config_dir() / "rig.yaml", preset="realistic")
         with ProcessGroup(results.OUT_DIR / "soak_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes:
@@ -123,8 +124,9 @@ def run(duration_s: float) -> list[Row]:
             context = Context()
             rclpy.init(args=[], context=context, domain_id=domain)
             samples, verged = _soak(Goals(context), nodes, duration_s)
+            mapped = segments("self").union(*(segments(nodes.pid(name)) for name in NODES))
             context.try_shutdown()
-    left = len(segments() - before)
+    left = sum(path.exists() for path in mapped)
     for name, of_node in samples.items():
         print(
             f"   {name}: {of_node.rss_mb[0]:.0f} to {of_node.rss_mb[-1]:.0f} MB, {of_node.slope_mb_h():+.1f} MB/h, "

@@ -14,6 +14,10 @@ if [ -f "$ros_setup" ]; then lock=requirements/lock_apt.txt; else lock=requireme
 say() { printf '\033[1m[setup]\033[0m %s\n' "$*" >&2; }
 fail() { printf '[setup] %s\n' "$*" >&2; exit 1; }
 
+# colcon, CMake and the wheels break on other paths, after minutes or when the first node starts.
+(LC_ALL=C; [[ "$root" =~ ^[A-Za-z0-9._/+@,=~-]+$ ]]) ||
+  fail "the path of this folder must have only ASCII letters, digits and . _ / + @ , = ~ -: got '$root'; move it"
+
 # One bootstrap at a time: two in one tree would break each other's build.
 exec 9>"$root/.bootstrap.lock"
 flock 9

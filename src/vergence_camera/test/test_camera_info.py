@@ -153,3 +153,25 @@ def test_an_unwritable_place_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         save_calibration(Calibration(640, 480, K, D), tmp_path / "file" / "left.yaml")
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("name", ["", "../x", "a/b", ".hidden", "/etc/passwd"])
+def test_a_camera_name_stays_in_its_folder(name: str) -> None:
+    with pytest.raises(CameraCalibrationError, match="camera_name must be a name"):
+        calibration_path("", name, lambda package: "/share")
+
+
+def test_a_url_stays_in_its_package() -> None:
+    with pytest.raises(CameraCalibrationError, match="must lead into its package"):
+        calibration_path("package://some/../../etc/x.yaml", "left", lambda package: "/share")
+
+
+def test_a_file_that_is_no_calibration_is_kept_beside_the_new_one(tmp_path: Path) -> None:
+    path = tmp_path / "left.yaml"
+    path.write_text(STANDARD)
+    calibration = load_calibration(path)
+    path.write_text("my own notes\n")
+    save_calibration(calibration, path)
+    assert (tmp_path / "left.yaml.bak").read_text() == "my own notes\n"
+    save_calibration(calibration, path)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["left.yaml", "left.yaml.bak"]

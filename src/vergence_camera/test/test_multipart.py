@@ -43,3 +43,10 @@ def test_the_parser_does_not_care_how_the_bytes_are_sliced(make_jpeg: Make, slic
     times = [part.time_ns for part in parts]
     assert times == sorted(times)
     assert times[0] > 0
+
+
+def test_a_length_of_thousands_of_digits_is_no_length(make_jpeg: Callable[..., bytes]) -> None:
+    picture = make_jpeg(0, 64, 48)
+    parser = MultipartParser(b"--frame")
+    head = b"--frame\r\nContent-Length: " + b"9" * 5000 + b"\r\n\r\n"
+    assert [part.data for part in parser.feed(head + picture + b"\r\n--frame\r\n", 1)] == [picture]

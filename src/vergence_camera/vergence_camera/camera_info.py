@@ -75,7 +75,15 @@ def load_calibration(path: Path) -> Calibration:
 
 
 def save_calibration(calibration: Calibration, path: Path) -> None:
-    """Write the calibration, whole or not at all; raise OSError if that cannot be done."""
+    """Write the calibration, whole or not at all; raise OSError if that cannot be done.
+
+    A file there that is no calibration is kept beside it, with .bak at the end of its name.
+    """
+    if path.is_file():
+        try:
+            load_calibration(path)
+        except CameraCalibrationError:
+            path.replace(path.with_name(f"{path.name}.bak"))
     document = {
         "image_width": calibration.width_px,
         "image_height": calibration.height_px,
@@ -106,6 +114,8 @@ def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -
     Raises:
         CameraCalibrationError: another kind of URL, or an unknown package.
     """
+    if not name or "/" in name or name.startswith("."):
+        raise CameraCalibrationError(f"camera_name must be a name without '/' that begins with no '.': got {name!r}")
     ros_home = os.environ.get("ROS_HOME") or str(Path.home() / ".ros")
     filled = (url or "file://${ROS_HOME}/camera_info/${NAME}.yaml").replace("${ROS_HOME}", ros_home)
     filled = filled.replace("${NAME}", name)
@@ -115,8 +125,11 @@ def calibration_path(url: str, name: str, package_share: Callable[[str], str]) -
     if parts.scheme == "file" and parts.netloc in ("", "localhost") and parts.path:
         return Path(unquote(parts.path))
     if parts.scheme == "package" and parts.netloc and parts.path:
+        below = Path(unquote(parts.path).lstrip("/"))
+        if ".." in below.parts:
+            raise CameraCalibrationError(f"camera_info_url must lead into its package: got '{url}'")
         try:
-            return Path(package_share(parts.netloc)) / unquote(parts.path).lstrip("/")
+            return Path(package_share(parts.netloc)) / below
         except LookupError as error:
             raise CameraCalibrationError(f"camera_info_url must name an installed package: got '{url}'") from error
     raise CameraCalibrationError(

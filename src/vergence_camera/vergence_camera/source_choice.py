@@ -10,6 +10,7 @@ from vergence_camera.devices import PinnedChoice, SystemTree
 from vergence_camera.errors import ChoiceError
 from vergence_camera.frame import FrameSource, ModeRequest
 from vergence_camera.sources.decoded_stream import DecodedStreamSource
+from vergence_camera.sources.http_client import shown_url
 from vergence_camera.sources.http_mjpeg import HttpMjpegSource
 from vergence_camera.sources.recordings import open_recording
 from vergence_camera.sources.replay import Replay
@@ -49,6 +50,11 @@ def register_url_scheme(scheme: str, build: UrlBuilder) -> None:
 def allowed_devices() -> str:
     """Return what a camera's choice must be, for messages."""
     return f"a camera, a video file, a folder of pictures or a URL ({', '.join(_URL_BUILDERS)})"
+
+
+def shown_choice(text: str) -> str:
+    """Return a camera's choice as it may stand in logs and diagnostics: a URL without passwords."""
+    return shown_url(text) if "://" in text else text
 
 
 def check_choice(text: str) -> None:

@@ -22,7 +22,7 @@ from vergence_camera.ros.calibration_service import CalibrationService
 from vergence_camera.ros.camera_controls import PREFIX, CameraControls
 from vergence_camera.ros.camera_messages import JpegSerializer
 from vergence_camera.ros.partner import PartnerCamera
-from vergence_camera.source_choice import SourceOptions, make_source
+from vergence_camera.source_choice import SourceOptions, make_source, shown_choice
 from vergence_camera.stamps import Stamp, Stamper
 from vergence_camera.v4l2.kernel import Kernel
 from vergence_common.diagnostics import ERROR, OK, STALE, WARN, Diagnostics, Report
@@ -63,7 +63,7 @@ class CameraNode(Node):
         self._controls.configure(settings.lock, settings.lock_after_s)
         self._rig_size = self._size_in_rig(settings.rig, eye)
 
-        diagnostics = Diagnostics(self, hardware_id=settings.device)
+        diagnostics = Diagnostics(self, hardware_id=shown_choice(settings.device))
         qos = watch_qos(self, diagnostics)
         self._images, self._topic = images or LocalImages(), self.resolve_topic_name("image_raw")
         self._images.offer(self._topic)
@@ -196,7 +196,12 @@ class CameraNode(Node):
         state = self._statistics.snapshot()
         settings: CameraParameters = self._settings.value
         request = self._source_options().request
-        values = {"device": settings.device, "requested": request, "mode": state.mode or "none", **state.values()}
+        values = {
+            "device": shown_choice(settings.device),
+            "requested": request,
+            "mode": state.mode or "none",
+            **state.values(),
+        }
         values["stamps_pushed_forward"], values["clock_jumps"] = self._stamper.pushed_forward, self._stamper.clock_jumps
         if state.ended:
             return Report(STALE, "the recording has ended", values)

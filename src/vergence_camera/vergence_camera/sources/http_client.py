@@ -2,6 +2,7 @@
 
 import base64
 import contextlib
+import re
 import select
 import socket
 import ssl
@@ -170,8 +171,14 @@ class _Dechunker:
         return bytes(body)
 
 
+_SECRET = re.compile(
+    r"([?&;][^=&;]*(?:pw|pass|user|usr|auth|token|key|secret|login|account)[^=&;]*=)[^&;]*", re.IGNORECASE
+)
+
+
 def shown_url(url: str) -> str:
-    """Return the address without its user and password."""
+    """Return the address without its user and password, also where the query has them, as many cameras want it."""
     scheme, _, rest = url.partition("://")
     host, slash, path = rest.partition("/")
-    return f"{scheme}://{host.rpartition('@')[2]}{slash}{path}"
+    shown = _SECRET.sub(r"\1...", path)
+    return f"{scheme}://{host.rpartition('@')[2]}{slash}{shown}"

@@ -10,6 +10,8 @@ from vergence_camera.sources.http_client import HttpStream, shown_url
 from vergence_camera.sources.multipart import MultipartParser, Part, boundary_of
 from vergence_camera.sources.requested_mode import check_requested
 
+_MOST_WAITING = 64  # pictures; a server without pace always has another one
+
 
 class HttpMjpegSource:
     """A FrameSource for multipart JPEG over HTTP.
@@ -55,7 +57,7 @@ class HttpMjpegSource:
         if not self._parts:
             self._receive(timeout_s)
         with contextlib.suppress(DisconnectedError):  # the received pictures come first; the next read raises it again
-            while self._parts and self._receive(0.0):
+            while 0 < len(self._parts) < _MOST_WAITING and self._receive(0.0):
                 pass
         if not self._parts:
             return None

@@ -7,7 +7,7 @@ from vergence_camera.errors import CorruptFrameError, UnsupportedError
 from vergence_camera.jpeg import inspect_jpeg
 
 _LONGEST_PART = 32 * 1024 * 1024
-_LENGTH = re.compile(rb"^content-length\s*:\s*(\d+)\s*$", re.IGNORECASE | re.MULTILINE)
+_LENGTH = re.compile(rb"^content-length\s*:\s*(\d{1,12})\s*$", re.IGNORECASE | re.MULTILINE)
 
 
 @dataclass(frozen=True)
