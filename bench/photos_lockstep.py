@@ -102,7 +102,7 @@ class MetricOfPairs:
         header = Header(stamp=to_stamp(left_stamp_s))
         skew_s = right_stamp_s - left_stamp_s
         measurement, camera = self._measurement, self.images[0].ideal
-        edge = measurement.edge(*self._ideal.draw(to_grey(left), to_grey(right)))
+        edge = measurement.edge(*self._ideal.draw(to_grey(left), to_grey(right)), self._ideal.seen_px)
         now_ns = _ns(left_stamp_s)
         eyes = self._joints.at(now_ns, _ns(right_stamp_s))
         passed = self._joints.samples_between(now_ns - _LOOK_BACK_NS, now_ns)

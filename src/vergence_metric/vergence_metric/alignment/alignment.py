@@ -18,7 +18,7 @@ _INITIAL_PAIRS = 5  # estimates on each of the first pairs, at once
 _NEGLIGIBLE_PX = 0.05
 _GATE_SIGMAS, _GATE_PX = 4.0, 1.0
 _REJECTIONS_TO_RESTART = 5
-_KNOWN_WITHIN_PX = 24
+_NEAR_PX = 36  # vertical offsets of usual mounts; of a known offset, its errors and the effect of the gaze
 
 Grey = NDArray[np.uint8]
 
@@ -119,17 +119,23 @@ class Aligner:
 
     def _estimate(self, left: Grey, right: Grey) -> None:
         p = self._parameters
-        # Once it is known, what differs is an error of the estimate, or the head's gaze.
-        known, widest_px = self._estimated and not self._rejected, math.ceil(p.max_vertical_px * 1.5)
-        estimate = estimate_misalignment(
-            left,
-            right,
-            search_horizontal_px=p.search_px,
-            search_vertical_px=min(widest_px, _KNOWN_WITHIN_PX) if known else widest_px,
-            about_vertical_px=self._vertical.value if known else 0.0,
-        )
+        known = self._estimated and not self._rejected
+        widest_px = math.ceil(p.max_vertical_px * 1.5)
+        near_px = min(widest_px, _NEAR_PX)
+        estimate = self._matched(left, right, near_px, self._vertical.value if known else 0.0)
+        if estimate is None and not known and near_px < widest_px:
+            estimate = self._matched(left, right, widest_px, 0.0)  # many more places look alike: only if none is near
         if estimate is not None:
             self._filter(estimate)
+
+    def _matched(self, left: Grey, right: Grey, reach_px: int, about_px: float) -> Misalignment | None:
+        return estimate_misalignment(
+            left,
+            right,
+            search_horizontal_px=self._parameters.search_px,
+            search_vertical_px=reach_px,
+            about_vertical_px=about_px,
+        )
 
     def _filter(self, estimate: Misalignment) -> None:
         outlier = self._vertical.is_outlier(estimate.vertical_px, estimate.vertical_sigma_px)

@@ -15,7 +15,7 @@ class WindowError(ValueError):
 class Window:
     """A centre window of one image, cut to the image: rows `top` to `bottom`, columns `left` to `right`, half open.
 
-    `size_px` is the requested side; `clipped` is true if the image is smaller than that in one direction.
+    `size_px` is the requested side; `clipped` is true if what the cameras saw is smaller than that in one direction.
     """
 
     size_px: int
@@ -36,12 +36,19 @@ class Window:
 
     @property
     def clipped(self) -> bool:
-        """True where the image ends before the window does."""
+        """True where what the cameras saw ends before the window does."""
         return self.height < self.size_px or self.width < self.size_px
 
     def lattice(self, points_per_side: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return rows and columns, from the window's corner, of at most that many pixels a side, evenly spread."""
         return _evenly(self.height, points_per_side), _evenly(self.width, points_per_side)
+
+    def cut(self, other: "Window") -> "Window":
+        """Return what of the window lies in another."""
+        top, left = max(self.top, other.top), max(self.left, other.left)
+        return replace(
+            self, top=top, left=left, bottom=min(self.bottom, other.bottom), right=min(self.right, other.right)
+        )
 
     def shifted(self, down: int, right: int) -> "Window":
         """Return the window as it lies in an image whose top left pixel is moved."""
@@ -70,9 +77,18 @@ def centre_window(size_px: int, height_px: int, width_px: int) -> Window:
     return Window(size_px, max(top, 0), max(left, 0), min(top + size_px, height_px), min(left + size_px, width_px))
 
 
-def centre_windows(sizes_px: Iterable[int], height_px: int, width_px: int) -> tuple[Window, ...]:
-    """Return one centre window per size, in the order given; raises WindowError as `centre_window` does."""
-    return tuple(centre_window(size_px, height_px, width_px) for size_px in sizes_px)
+def centre_windows(
+    sizes_px: Iterable[int], height_px: int, width_px: int, seen_px: int | None = None
+) -> tuple[Window, ...]:
+    """Return one centre window per size, in the order given; raises WindowError as `centre_window` does.
+
+    `seen_px` is the side of the largest centre square that the cameras saw; None for the whole image.
+    """
+    found = tuple(centre_window(size_px, height_px, width_px) for size_px in sizes_px)
+    if seen_px is None:
+        return found
+    seen = centre_window(max(seen_px, 1), height_px, width_px)
+    return tuple(window.cut(seen) for window in found)
 
 
 def hull(windows: Iterable[Window]) -> Window:

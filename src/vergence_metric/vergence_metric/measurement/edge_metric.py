@@ -194,12 +194,13 @@ class EdgeMetric:
         self._aligner = Aligner(alignment or AlignmentParameters())
         self._scratch = (Scratch(), Scratch())  # one for each eye
 
-    def measure(self, left: NDArray[Any], right: NDArray[Any]) -> EdgeMetricResult:
+    def measure(self, left: NDArray[Any], right: NDArray[Any], seen_px: int | None = None) -> EdgeMetricResult:
         """Measure a pair of (h, w, 3) BGR or (h, w) grey uint8 images of one size.
 
-        Raises ImageShapeError where the images are not, or differ in size.
+        Windows are cut to the centre square of side `seen_px`; None for the whole image. Raises ImageShapeError where
+        the images are not such, or differ in size.
         """
-        return self.measure_aligned(self.align(left, right))
+        return self.measure_aligned(self.align(left, right), seen_px)
 
     def align(self, left: NDArray[Any], right: NDArray[Any]) -> AlignedPair:
         """Return a pair in grey and aligned; raises ImageShapeError as `measure` does."""
@@ -219,11 +220,11 @@ class EdgeMetric:
         """Compute the deferred estimate of alignment, if any; if not called, the next pair does it."""
         self._aligner.update_alignment()
 
-    def measure_aligned(self, pair: AlignedPair) -> EdgeMetricResult:
-        """Measure a pair that `align` has returned."""
+    def measure_aligned(self, pair: AlignedPair, seen_px: int | None = None) -> EdgeMetricResult:
+        """Measure a pair that `align` has returned; see `measure`."""
         p, stage_s = self._contrast, dict(pair.stage_s)
         height, width = pair.left_grey.shape
-        windows = centre_windows(self._edges.windows_px, height, width)
+        windows = centre_windows(self._edges.windows_px, height, width, seen_px)
         small = small_windows(windows, p.foveal_sigma_px)
         outer = hull(small)
         area = (

@@ -68,9 +68,9 @@ class PairMeasurement:
             self._tracker = None
             self._memory = PairMemory(p.tracker.memory_s)
 
-    def edge(self, left: NDArray[Any], right: NDArray[Any]) -> EdgeMetricResult:
-        """Return metric I of a pair of images of one size; raises ImageShapeError for others."""
-        return self._metric.measure(left, right)
+    def edge(self, left: NDArray[Any], right: NDArray[Any], seen_px: int | None = None) -> EdgeMetricResult:
+        """Return metric I of a pair of images of one size; see `EdgeMetric.measure`."""
+        return self._metric.measure(left, right, seen_px)
 
     def update_alignment(self) -> None:
         """Compute the deferred estimate of alignment, if any; to be called once the pair's results are out."""

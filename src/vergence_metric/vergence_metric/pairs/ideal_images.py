@@ -18,7 +18,8 @@ Models = tuple[CameraModel, CameraModel]
 @dataclass(frozen=True)
 class _Eye:
     image: EyeImage
-    maps: tuple[Any, Any] | None
+    maps: tuple[Any, Any] | None = None
+    seen_px: int | None = None
 
     def draw(self, pixels: Pixels) -> Pixels:
         """Return the ideal image; what lies outside the camera's repeats its border."""
@@ -60,8 +61,13 @@ class IdealImages:
         if self._eyes is None or self._cameras is None or not _same(cameras, self._cameras):
             self._cameras = cameras
             left, right = eye_images(self._rig, cameras)
-            self._eyes = _Eye(left, _maps(left)), _Eye(right, _maps(right))
+            self._eyes = _eye(left), _eye(right)
         return self._eyes[0].image, self._eyes[1].image
+
+    @property
+    def seen_px(self) -> int | None:
+        """Side of the largest square about the middle that both cameras see [px]; None where they see all."""
+        return min((eye.seen_px for eye in self._eyes or () if eye.seen_px is not None), default=None)
 
     def draw(self, left: Pixels, right: Pixels) -> tuple[Pixels, Pixels]:
         """Return the ideal images of a pair that the cameras in use took, (h, w) or (h, w, 3) each."""
@@ -74,9 +80,15 @@ def _same(cameras: Models, others: Models) -> bool:
     return all(one is other or one.equals(other) for one, other in zip(cameras, others, strict=True))
 
 
-def _maps(image: EyeImage) -> tuple[Any, Any] | None:
-    """Return the maps of cv2.remap; None where the camera's image is the ideal one."""
+def _eye(image: EyeImage) -> _Eye:
+    """Return an eye with the maps of cv2.remap, where the camera's image is not the ideal one already."""
     if image.is_same:
-        return None
-    fixed, fractions = cv2.convertMaps(*image.maps(), cv2.CV_16SC2)
-    return fixed, fractions
+        return _Eye(image)
+    x, y = image.maps()
+    camera = image.camera
+    unseen = (x < 0) | (x > camera.width_px - 1) | (y < 0) | (y > camera.height_px - 1)
+    # In a square of side s about pixel n // 2 lie the pixels from n // 2 - s // 2 on, s of them.
+    down, across = (np.abs(2 * np.arange(n) - 2 * (n // 2) + 0.5) for n in unseen.shape)
+    nearest = np.maximum.outer(down, across)[unseen].min(initial=np.inf)
+    fixed, fractions = cv2.convertMaps(x, y, cv2.CV_16SC2)
+    return _Eye(image, (fixed, fractions), None if np.isinf(nearest) else int(nearest))

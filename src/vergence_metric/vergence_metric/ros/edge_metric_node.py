@@ -87,7 +87,7 @@ class EdgeMetricNode(MetricNode):
         with self._times.measure("pictures"):
             self._update_order(pair, ideal)
         with self._times.measure("metric"):
-            edge = self._measurement.edge(ideal.left, ideal.right)
+            edge = self._measurement.edge(ideal.left, ideal.right, ideal.seen_px)
         if self._edge_publisher.get_subscription_count() or self._error_publisher.get_subscription_count():
             self._publish_fovea(edge, models, header, skew_s)
         self._times.add("edge_after_images", (monotonic_ns() - max(pair.left.arrived_ns, pair.right.arrived_ns)) * 1e-9)

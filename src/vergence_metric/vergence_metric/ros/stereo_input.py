@@ -60,6 +60,8 @@ class IdealPair:
     left: npt.NDArray[np.uint8]
     right: npt.NDArray[np.uint8]
     eye_images: tuple[EyeImage, EyeImage] | None
+    seen_px: int | None = None
+    """Side of the largest square about the middle that both cameras saw; None where they saw all."""
 
     @property
     def cameras(self) -> Models | None:
@@ -276,7 +278,7 @@ class StereoInput:
         if cameras is None:
             return IdealPair(left, right, None)
         self.eye_images = self._ideal.set_cameras(cameras)
-        return IdealPair(*self._ideal.draw(left, right), self.eye_images)
+        return IdealPair(*self._ideal.draw(left, right), self.eye_images, self._ideal.seen_px)
 
     def _stream_report(self, side: int) -> Report:
         health = self._health[side]
