@@ -2,13 +2,14 @@
 # make test   every test
 # make lint   ruff format and lint, mypy
 # make bench  every benchmark (ONLY=name for one), results in out/bench
+# make soak   goals every five seconds for an hour (DURATION_S=300 for five minutes): memory, threads, descriptors
 # make study  docs/metric_study.md anew, from the simulator
 # make setup  only the environment and the build
 # All of these make .venv and install/ first, or find them ready, with the versions of requirements/lock.txt.
 # make lock   the newest versions into requirements/lock.txt (ARGS=--keep: only what the requirements make necessary)
 SHELL := /bin/bash
 .DEFAULT_GOAL := demo
-.PHONY: setup setup-dev demo test lint bench study lock clean
+.PHONY: setup setup-dev demo test lint bench soak study lock clean
 
 setup:
 	@bash tools/bootstrap.sh run
@@ -27,6 +28,9 @@ lint: setup-dev
 
 bench: setup-dev
 	@source env.sh && exec python -m bench $(if $(ONLY),--only $(ONLY))
+
+soak: setup-dev
+	@source env.sh && exec python -m bench.soak $(DURATION_S)
 
 study: setup-dev
 	@source env.sh && exec python tools/metric_study.py

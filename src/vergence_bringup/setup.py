@@ -9,7 +9,8 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/vergence_bringup"]),
         ("share/vergence_bringup", ["package.xml", "LICENSE", "CHANGELOG.rst"]),
-        ("share/vergence_bringup/config", [path for path in glob("config/*") if not path.endswith("~")]),
+        ("share/vergence_bringup/config", [path for path in glob("config/*.*") if not path.endswith("~")]),
+        ("share/vergence_bringup/config/security", glob("config/security/*")),
         ("share/vergence_bringup/launch", glob("launch/*.launch.py")),
         ("bin", ["scripts/vergence"]),  # colcon puts this folder on the PATH
         ("share/vergence_bringup/systemd", glob("systemd/*")),

@@ -1,11 +1,8 @@
 """No value of any parameter ends a running node: what a node cannot use is refused with the parameter's name."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterValue
@@ -14,42 +11,12 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from vergence_bringup.node_table import NODES, parameter_groups
-from vergence_camera.ros.camera_node import CameraNode
-from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
+from vergence_bringup.testing.ros.every_node import KINDS, parameters_without_hardware
 from vergence_metric.ros.box_metric_node import BoxMetricNode
 from vergence_metric.ros.edge_metric_node import EdgeMetricNode
-from vergence_metric.ros.eye_rotation_node import EyeRotationNode
 from vergence_rig.testing.odd_values import ODD_VALUES
-from vergence_servo.ros.servo_node import ServoNode
-from vergence_sim.ros.photo_node import PhotoNode
-from vergence_sim.ros.sim_node import SimNode
 
 pytestmark = pytest.mark.graph
-
-KINDS: dict[str, Callable[..., Node]] = {
-    "box_metric_node": BoxMetricNode,
-    "camera_node": CameraNode,
-    "edge_metric_node": EdgeMetricNode,
-    "eye_rotation_node": EyeRotationNode,
-    "gaze_controller_node": GazeControllerNode,
-    "photo_node": PhotoNode,
-    "servo_node": ServoNode,
-    "sim_node": SimNode,
-}
-
-
-def _given(executable: str, folder: Path) -> dict[str, Any]:
-    """Return the parameters with which a node starts without hardware."""
-    image = np.random.default_rng(0).integers(0, 255, (120, 160, 3), np.uint8)
-    pictures = [folder / "left.png", folder / "right.png"]
-    for picture in pictures:
-        cv2.imwrite(str(picture), image)
-    given: dict[str, dict[str, Any]] = {
-        "camera_node": {"device": str(folder), "width_px": 160, "height_px": 120},
-        "photo_node": {"left": str(pictures[0]), "right": str(pictures[1])},
-        "servo_node": {"backend": "fake", "pose_file": str(folder / "pose.json")},
-    }
-    return given.get(executable, {})
 
 
 def _message(name: str, value: object) -> Any:
@@ -84,7 +51,7 @@ def test_no_value_of_any_parameter_ends_the_node(
     if executable == "sim_node":
         request.getfixturevalue("opengl")
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "ros"))
-    node = graph.start(KINDS[executable], **_given(executable, tmp_path))
+    node = graph.start(KINDS[executable], **parameters_without_hardware(executable, tmp_path))
     client = Client(graph, node)
     names = [prefix + spec.name for prefix, group in parameter_groups(executable) for spec in group.specs()]
     before = dict(zip(names, client.get(names), strict=True))

@@ -1,4 +1,7 @@
-"""A node's health on /diagnostics, once a second, from small functions that each report on one thing."""
+"""A node's health on /diagnostics, from small functions that each report on one thing.
+
+Once a second, and half a second after a level has changed at the latest.
+"""
 
 import socket
 from collections.abc import Callable
@@ -33,7 +36,9 @@ class Diagnostics:
         self._message, self._statuses = DiagnosticArray(), dict[str, DiagnosticStatus]()
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         # Simulated time may stand, and then the reports say why.
-        self._timer = node.create_timer(PERIOD_S, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._levels: dict[str, int] = {}
+        self._due = False
+        self._timer = node.create_timer(PERIOD_S / 2, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def add(self, name: str, report: Callable[[], Report]) -> None:
         """Call `report` at every publication. A second source of the same name replaces the first."""
@@ -52,8 +57,19 @@ class Diagnostics:
 
     def publish(self) -> None:
         """Publish all reports."""
+        self._publish(self.collect())
+
+    def _look(self) -> None:
+        """Publish every second time, and at once where a level has changed."""
+        reports = self.collect()
+        self._due = not self._due
+        if self._due or {name: report.level for name, report in reports.items()} != self._levels:
+            self._publish(reports)
+
+    def _publish(self, reports: dict[str, Report]) -> None:
+        self._levels = {name: report.level for name, report in reports.items()}
         self._message.header.stamp = self._node.get_clock().now().to_msg()
-        self._message.status = [self._status(name, report) for name, report in self.collect().items()]
+        self._message.status = [self._status(name, report) for name, report in reports.items()]
         self._publisher.publish(self._message)
 
     def _status(self, name: str, report: Report) -> DiagnosticStatus:

@@ -8,7 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.mount_drift import MOST_CORRECTED_RAD, MountDrift, MountReading
+from vergence_gaze.estimation.observations import EyeRotationObservation, JointReport
+from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_rig.rig import default_rig
 
 DEG = math.pi / 180
@@ -103,3 +106,22 @@ def test_one_rest_counts_once_however_often_it_is_read() -> None:
     assert not drift.known
     assert drift.summary() == {}
     assert np.isnan(drift.offsets_rad).all()
+
+
+def test_the_controller_corrects_a_bumped_camera_and_says_so() -> None:
+    rig = default_rig()
+    controller = GazeController(rig, gaze_parameters())
+    bump_rad, now_s = math.radians(1.0), 10.0
+    for rest in range(20):
+        pan_rad = 0.02 * (-1) ** rest
+        for _ in range(60):  # the eyes rest long enough to be read
+            now_s += 0.02
+            positions = {"pan_left": pan_rad - 0.05, "pan_right": pan_rad + 0.05, "tilt": 0.0}
+            controller.step(now_s, [JointReport(now_s, positions)])
+        seen = EyeRotationObservation(now_s, 0.0, 0.1 + bump_rad, 0.0005, roll_rad=0.001, pitch_rad=-0.002)
+        controller.step(now_s + 0.001, [seen])
+    corrected_rad = controller.mounts.correction_rad
+    assert corrected_rad == pytest.approx(bump_rad, abs=math.radians(0.15))
+    assert controller.step(now_s + 0.01).report.vergence_rad == pytest.approx(0.1 + corrected_rad, abs=0.01)
+    assert controller.mounts.summary()["mount_vergence_corrected_deg"] == pytest.approx(1.0, abs=0.15)
+    assert not controller.mounts.request

@@ -61,6 +61,9 @@ class Command:
     track_request: TrackRequest | None = None
 
 
+_CLAIM_S = 0.6  # without results of images, after which eyes are no longer said to be verged
+
+
 def make_report(
     now_s: float,
     perception: Perception,
@@ -90,7 +93,7 @@ def make_report(
         reason=reason,
         law=law,
         mode=mode,
-        verged=perception.judge.verged,
+        verged=perception.judge.verged and now_s - perception.image_s <= _CLAIM_S,
         target_moving=perception.tracking.filter.moving,
         version_rad=0.5 * float(joints[0] + joints[1]),
         vergence_rad=float(joints[1] - joints[0]),

@@ -8,7 +8,7 @@ from statistics import median
 _RECENT = 90
 LEAST_RATE_HZ = 5.0
 """Rate by the stamps below which nothing can be followed or paired in time [Hz]."""
-_SLOW_INTERVALS = 3
+_SLOW_INTERVALS, _FEW = 2, 3
 _STAMPS = 20
 _AGE_S = (-0.25, 1.0)
 
@@ -104,14 +104,14 @@ class StreamHealth:
         """Return what is wrong with the stamps, "" if nothing is."""
         intervals_s = list(self._intervals_s)
         stuck = sum(interval_s <= 0 for interval_s in intervals_s)
-        if len(intervals_s) >= _SLOW_INTERVALS and 2 * stuck > len(intervals_s):
+        if len(intervals_s) >= _FEW and 2 * stuck > len(intervals_s):
             what = "they are zero" if self._stamp_s == 0 else f"{stuck} of the last {len(intervals_s)} do not"
             return f"stamps must increase from image to image: {what}"
         if len(intervals_s) >= _SLOW_INTERVALS:
-            interval_s = median(intervals_s[-_SLOW_INTERVALS:])
+            interval_s = min(intervals_s[-_SLOW_INTERVALS:])
             if interval_s > 1.0 / LEAST_RATE_HZ:
                 return f"the camera is slower than needed: {1 / interval_s:.1f} Hz, at least {LEAST_RATE_HZ:g} Hz"
-        if len(self._ages_s) >= _SLOW_INTERVALS:
+        if len(self._ages_s) >= _FEW:
             age_s = median(list(self._ages_s)[-_STAMPS:])
             if not _AGE_S[0] <= age_s <= _AGE_S[1]:
                 late = f"{age_s:.3g} s old" if age_s > 0 else f"{-age_s:.3g} s ahead of the clock"

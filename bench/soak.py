@@ -1,0 +1,181 @@
+"""`make soak`: a simulated head looks at a target that is moved every five seconds, for an hour or DURATION_S seconds.
+
+Memory, threads and descriptors of every node are sampled; what is left in shared memory is counted at the end.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseStamped
+from rclpy.action import ActionClient
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from bench import results
+from bench.process_cost import rss_mb
+from bench.results import Row
+from vergence_bringup.ros.processes import ProcessGroup, config_dir
+from vergence_bringup.ros.simulated_head import simulated_head
+from vergence_common.domains import own_domain
+from vergence_msgs.action import LookAt
+
+DURATION_S, PERIOD_S, SAMPLE_S = 3600.0, 5.0, 10.0
+NODES = ("sim_node", "edge_metric_node", "gaze_controller_node")
+_WARM_SHARE = 0.25  # of the duration: caches fill, and count for no slope
+_START_S = 60.0
+_SHM = Path("/dev/shm")
+
+
+@dataclass
+class Samples:
+    """Of one process: times [s], memory [MB], numbers of threads and of open files."""
+
+    time_s: list[float] = field(default_factory=list)
+    rss_mb: list[float] = field(default_factory=list)
+    threads: list[int] = field(default_factory=list)
+    descriptors: list[int] = field(default_factory=list)
+
+    def add(self, time_s: float, pid: int) -> None:
+        """Look at the process now."""
+        self.time_s.append(time_s)
+        self.rss_mb.append(rss_mb(pid))
+        self.threads.append(len(os.listdir(f"/proc/{pid}/task")))
+        self.descriptors.append(len(os.listdir(f"/proc/{pid}/fd")))
+
+    def slope_mb_h(self) -> float:
+        """Return the growth of the memory after the warm-up [MB/h]."""
+        first = int(_WARM_SHARE * len(self.time_s))
+        if len(self.time_s) - first < 2:
+            return float("nan")
+        return float(np.polyfit(np.array(self.time_s[first:]) / 3600.0, self.rss_mb[first:], 1)[0])
+
+    def gained(self, what: str) -> int:
+        """Return how many threads or descriptors the last third has more than the time after the warm-up."""
+        values = getattr(self, what)[int(_WARM_SHARE * len(self.time_s)) :]
+        third = max(len(values) // 3, 1)
+        return int(np.median(values[-third:]) - np.median(values[:third]))
+
+
+class Goals:
+    """Moves the target and looks at it, one goal after the other."""
+
+    def __init__(self, context: Context) -> None:
+        self.node = Node("soak", context=context)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self.node)
+        self._pose = self.node.create_publisher(PoseStamped, "sim/target_pose", 10)
+        self._client = ActionClient(self.node, LookAt, "gaze/look_at")
+        self._random = np.random.default_rng(0)
+
+    def ready(self) -> bool:
+        """Run callbacks; return whether the graph is there."""
+        self._executor.spin_once(timeout_sec=0.2)
+        return self._client.server_is_ready() and self._pose.get_subscription_count() > 0
+
+    def one(self) -> bool:
+        """Look at a new place; return whether the eyes verged on it within the period."""
+        end_s = time.monotonic() + PERIOD_S
+        x, y, z = (float(v) for v in self._random.uniform((0.45, -0.12, -0.06), (0.9, 0.12, 0.06)))
+        pose = PoseStamped()
+        pose.header.frame_id = "rig_base"
+        pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = x, y, z
+        pose.pose.orientation.w = 1.0
+        self._pose.publish(pose)
+        goal = LookAt.Goal(kind=LookAt.Goal.POINT, time_limit_s=PERIOD_S - 0.5)
+        goal.header.frame_id = "rig_base"
+        goal.point.x, goal.point.y, goal.point.z = x, y, z
+        sent = self._client.send_goal_async(goal)
+        self._run(sent.done, end_s)
+        verged = False
+        if sent.done() and sent.result().accepted:
+            ended = sent.result().get_result_async()
+            self._run(ended.done, end_s)
+            verged = ended.done() and ended.result().result.result == LookAt.Result.VERGED
+        self._run(lambda: False, end_s)
+        return verged
+
+    def _run(self, done: Callable[[], bool], end_s: float) -> None:
+        while not done() and time.monotonic() < end_s:
+            self._executor.spin_once(timeout_sec=min(0.2, max(end_s - time.monotonic(), 0.0)))
+
+
+def segments() -> set[str]:
+    """Return the names of the middleware's shared-memory segments on this machine."""
+    return {name for name in os.listdir(_SHM) if name.startswith(("fastrtps_", "fastdds_"))} if _SHM.is_dir() else set()
+
+
+def run(duration_s: float) -> list[Row]:
+    """Run the soak and return its rows."""
+    before = segments()
+    with own_domain() as domain:
+        commands = simulated_head(config_dir() / "rig.yaml", preset="realistic")
+        with ProcessGroup(results.OUT_DIR / "soak_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes:
+            for name in NODES:
+                nodes.start(name, commands[name])
+            os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+            context = Context()
+            rclpy.init(args=[], context=context, domain_id=domain)
+            samples, verged = _soak(Goals(context), nodes, duration_s)
+            context.try_shutdown()
+    left = len(segments() - before)
+    for name, of_node in samples.items():
+        print(
+            f"   {name}: {of_node.rss_mb[0]:.0f} to {of_node.rss_mb[-1]:.0f} MB, {of_node.slope_mb_h():+.1f} MB/h, "
+            f"threads {of_node.threads[-1]}, descriptors {of_node.descriptors[-1]}",
+            flush=True,
+        )
+    unit = f"in {duration_s / 3600:.2g} h"
+    return [
+        Row("soak.success_share", float(np.mean(verged)), f"of {len(verged)} goals"),
+        Row("soak.rss_slope_mb_h", max(s.slope_mb_h() for s in samples.values()), f"MB/h, worst node, {unit}"),
+        Row("soak.threads_gained", float(max(s.gained("threads") for s in samples.values())), unit),
+        Row("soak.descriptors_gained", float(max(s.gained("descriptors") for s in samples.values())), unit),
+        Row("soak.segments_left", float(left), "segments in /dev/shm"),
+    ]
+
+
+def _soak(goals: Goals, nodes: ProcessGroup, duration_s: float) -> tuple[dict[str, Samples], list[bool]]:
+    started_s = time.monotonic()
+    while not goals.ready():
+        nodes.check()
+        if time.monotonic() - started_s > _START_S:
+            raise RuntimeError(f"the graph did not start within {_START_S:g} s")
+    samples = {name: Samples() for name in NODES}
+    verged: list[bool] = []
+    for now_s in _periods(duration_s):
+        nodes.check()
+        if now_s - (samples[NODES[0]].time_s or [-SAMPLE_S])[-1] >= SAMPLE_S:
+            for name, of_node in samples.items():
+                of_node.add(now_s, nodes.pid(name))
+        verged.append(goals.one())
+        if len(verged) % 60 == 0:
+            print(f"   {now_s:.0f} s: {sum(verged)} of {len(verged)} goals verged", flush=True)
+    return samples, verged
+
+
+def _periods(duration_s: float) -> Iterator[float]:
+    """Yield the time since the start until the duration is over."""
+    started_s = time.monotonic()
+    while (now_s := time.monotonic() - started_s) < duration_s:
+        yield now_s
+
+
+def main() -> int:
+    """Run the soak for the seconds that the command line gives, print and write its rows."""
+    duration_s = float(sys.argv[1]) if len(sys.argv) > 1 else DURATION_S
+    rows = run(duration_s)
+    path = results.write("soak", rows)
+    print(results.table(rows))
+    print(f"   written to {path.relative_to(results.OUT_DIR.parent.parent)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

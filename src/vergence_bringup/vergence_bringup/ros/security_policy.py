@@ -1,0 +1,110 @@
+"""SROS2 policies of the nodes: what each publishes, subscribes, serves and asks for, as the running nodes say."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from xml.sax.saxutils import quoteattr
+
+from rclpy.node import Node
+
+EYES = ("left", "right")
+OPERATOR = "operator"
+"""Enclave of the tools: `vergence look`, `watch`, `identify`, `ros2` and recordings."""
+
+_COMPRESSED = tuple(f"/{eye}/image_raw/compressed" for eye in EYES)
+_DETECTIONS = tuple(f"/vergence/{eye}_detections" for eye in EYES)
+SOMETIMES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "box_metric_node": (_DETECTIONS, _COMPRESSED),
+    "edge_metric_node": ((), _COMPRESSED),
+    "eye_rotation_node": ((), _COMPRESSED),
+    "gaze_controller_node": ((), ("/vergence/edge", "/tf", "/tf_static")),
+}
+"""Topics that a node publishes and subscribes only with some parameters or installed packages."""
+CLOCK = "/clock"
+"""Subscribed by every node that uses simulated time."""
+
+_ACTION = "/_action/"
+_ACTION_TOPICS = ("feedback", "status")
+
+
+@dataclass(frozen=True)
+class Endpoints:
+    """Full names of what one node has; actions stand for their topics and services."""
+
+    publish: frozenset[str]
+    subscribe: frozenset[str]
+    reply: frozenset[str]
+    request: frozenset[str]
+    execute: frozenset[str]
+
+
+def endpoints_of(node: Node) -> Endpoints:
+    """Return what a running node has, as the graph says."""
+    name, namespace = node.get_name(), node.get_namespace()
+
+    def names(found: Iterable[tuple[str, Sequence[str]]]) -> set[str]:
+        return {one for one, _ in found}
+
+    publish = names(node.get_publisher_names_and_types_by_node(name, namespace))
+    subscribe = names(node.get_subscriber_names_and_types_by_node(name, namespace))
+    reply = names(node.get_service_names_and_types_by_node(name, namespace))
+    request = names(node.get_client_names_and_types_by_node(name, namespace))
+    actions = {service.partition(_ACTION)[0] for service in reply if _ACTION in service}
+    return Endpoints(
+        frozenset(topic for topic in publish if _ACTION not in topic),
+        frozenset(topic for topic in subscribe if _ACTION not in topic),
+        frozenset(service for service in reply if _ACTION not in service),
+        frozenset(service for service in request if _ACTION not in service),
+        frozenset(actions),
+    )
+
+
+def with_sometimes(executable: str, endpoints: Endpoints) -> Endpoints:
+    """Return what a node is allowed: what it has, and what it has sometimes."""
+    publish, subscribe = SOMETIMES.get(executable, ((), ()))
+    return replace(
+        endpoints, publish=endpoints.publish.union(publish), subscribe=endpoints.subscribe.union(subscribe, (CLOCK,))
+    )
+
+
+def policy(enclaves: Mapping[str, Sequence[tuple[str, str, Endpoints]]]) -> str:
+    """Return the policy file of enclaves, each with the namespace, name and endpoints of its nodes."""
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<policy version="0.2.0">', "  <enclaves>"]
+    for enclave, nodes in enclaves.items():
+        lines += [f"    <enclave path={quoteattr(f'/vergence/{enclave}')}>", "      <profiles>"]
+        for namespace, name, endpoints in nodes:
+            lines += _profile(namespace, name, endpoints)
+        lines += ["      </profiles>", "    </enclave>"]
+    lines += [*_operator(), "  </enclaves>", "</policy>", ""]
+    return "\n".join(lines)
+
+
+def _profile(namespace: str, name: str, endpoints: Endpoints) -> list[str]:
+    lines = [f"        <profile ns={quoteattr(namespace)} node={quoteattr(name)}>"]
+    for group, element, verb, names in (
+        ("topics", "topic", "publish", endpoints.publish),
+        ("topics", "topic", "subscribe", endpoints.subscribe),
+        ("services", "service", "reply", endpoints.reply),
+        ("services", "service", "request", endpoints.request),
+        ("actions", "action", "execute", endpoints.execute),
+    ):
+        if names:
+            lines.append(f'          <{group} {verb}="ALLOW">')
+            lines += [f"            <{element}>{one}</{element}>" for one in sorted(names)]
+            lines.append(f"          </{group}>")
+    return [*lines, "        </profile>"]
+
+
+def _operator() -> list[str]:
+    rules = ("topics", "topic", "subscribe"), ("services", "service", "request"), ("actions", "action", "call")
+    lines = [f"    <enclave path={quoteattr(f'/vergence/{OPERATOR}')}>", "      <profiles>"]
+    lines.append('        <profile ns="/" node="*">')
+    lines += ['          <topics publish="ALLOW">']
+    lines += [f"            <topic>{name}</topic>" for name in ("/joint_command", "/gaze/target", "/rosout")]
+    lines += ["            <topic>/parameter_events</topic>", "          </topics>"]
+    for group, element, verb in rules:
+        lines += [
+            f'          <{group} {verb}="ALLOW">',
+            f"            <{element}>*</{element}>",
+            f"          </{group}>",
+        ]
+    return [*lines, "        </profile>", "      </profiles>", "    </enclave>"]
