@@ -25,8 +25,10 @@ from vergence_bringup.figures.pictures import (
 from vergence_bringup.ros.look import result_name
 from vergence_common.stamps import to_seconds
 from vergence_metric.measurement.edge_metric import EdgeMetric
+from vergence_metric.pairs.ideal_images import IdealImages
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import EdgeVergence
+from vergence_rig.camera import CameraModel
 from vergence_rig.rig import Rig
 
 # The target point must end inside the 50 px fovea of both eyes.
@@ -58,6 +60,8 @@ class StationRunner:
         self._tolerance_deg = tolerance_deg
         self._out_dir = out_dir
         self._edge_metric = EdgeMetric()
+        self._ideal = IdealImages(rig)
+        self._eye_images = self._ideal.set_cameras((CameraModel(rig.left_camera), CameraModel(rig.right_camera)))
 
     def wait_until_ready(self) -> None:
         """Wait until every node publishes."""
@@ -120,15 +124,15 @@ class StationRunner:
 
     def _store(self, station: Station, moment: str, picture: StereoPicture, truth: Any) -> None:
         folder = self._out_dir / "pictures"
-        measured = self._edge_metric.measure(picture.left_bgr, picture.right_bgr)
+        views = self._ideal.draw(picture.left_bgr, picture.right_bgr)  # as the metric nodes measure them
+        measured = self._edge_metric.measure(*views, self._ideal.seen_px)
         windows = [int(size) for size in picture.edge.windows_px]
         left, right = measured.left_edges.mask, measured.right_edges.mask
         name = f"{station.name}_{moment}"
         boxes = (None, None) if picture.box is None else (picture.box.left, picture.box.right)
-        clicked = ((truth.left_x_px, truth.left_y_px), (truth.right_x_px, truth.right_y_px))
-        for eye, view, box, place in zip(
-            ("left", "right"), (picture.left_bgr, picture.right_bgr), boxes, clicked, strict=True
-        ):
+        places = ((truth.left_x_px, truth.left_y_px), (truth.right_x_px, truth.right_y_px))
+        clicked = [image.to_ideal([place])[0].tolist() for image, place in zip(self._eye_images, places, strict=True)]
+        for eye, view, box, place in zip(("left", "right"), views, boxes, clicked, strict=True):
             drawn = with_cross(_boxed(view, box))
             if self._stage.photo_figures(station, truth) is not None:
                 drawn = with_ring(with_windows(drawn, [round(2 * _FOVEA_HALF_PX)]), place)
