@@ -13,9 +13,10 @@ from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.sighted import in_both_eyes, in_left_eye
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
 from vergence_metric.tracking.track import Track, TrackStatus
-from vergence_metric.tracking.tracked_target import Target, parallax
+from vergence_metric.tracking.tracked_target import Target, parallax, vergence_of
 
 USUAL_EXTENT_PX = (60.0, 60.0)
+_TURNED_PX = 2.0  # change of the vergence since the last match up to which the expected disparity is searched alone
 _SAME_PX = 2.0  # candidates this close to the answer are it
 _REST_PX, _MOVED_PX, _MOVED_SHARE = 4.0, 8.0, 0.3  # how far a visible target may be from where it is expected
 
@@ -75,7 +76,11 @@ def track_requested(
     It is AMBIGUOUS while no distance is certain, or while places farther than `largest_spread_px` look as much like it.
     """
     views = pair.views
-    expected_px = target.expected_disparity(sighting.pixel, views) if depths.certain else None
+    # Hobby servos do not turn by what they report: after a move in depth a search about what is expected would find the
+    # next repetition of a texture there.
+    turned_px = abs(vergence_of(views) - target.matched_vergence_rad) * views[0].camera.fx_px
+    known = depths.certain and turned_px <= _TURNED_PX
+    expected_px = target.expected_disparity(sighting.pixel, views) if known else None
     disparity = estimator.estimate(pair.left, pair.right, sighting.pixel, expected_px)
     likeliest = weigh_depths(target, depths, disparity, sighting.pixel, views)
     target.appearance.accept(pair.left, sighting, renew=disparity.ok)

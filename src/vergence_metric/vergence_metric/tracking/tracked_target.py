@@ -33,6 +33,7 @@ class Target:
     aside_px: Pixel = (0.0, 0.0)  # from its region's centre to the fovea when locked on
     hidden: bool = False
     right_seen_s: float = -math.inf
+    matched_vergence_rad: float = math.nan  # of the eyes by their joints, when last matched in the right eye
     parallax_rad: float = math.nan  # angle from the left eye's ray to the right eye's, in the plane of the baseline
     patch: RememberedPatch | None = None  # of a requested target
     depths: DepthHypotheses | None = None  # of a requested target
@@ -92,7 +93,7 @@ class Target:
 
     def update_parallax(self, stamp_s: float, left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> None:
         """Update the parallax, the angle between the two eyes' rays, which does not depend on the eyes' motion."""
-        self.right_seen_s = stamp_s
+        self.right_seen_s, self.matched_vergence_rad = stamp_s, vergence_of(views)
         self.parallax_rad = parallax(left_px, views, right_px)
 
     def disparity_age_s(self, stamp_s: float) -> float:
@@ -120,6 +121,11 @@ class Target:
 def parallax(left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> float:
     """Return the angle from the left eye's ray to the right eye's, in the plane of the baseline [rad]."""
     return _across(views[1].direction(right_px)) - _across(views[0].direction(left_px))
+
+
+def vergence_of(views: tuple[EyeView, EyeView]) -> float:
+    """Return the eyes' vergence by their joints [rad]."""
+    return views[1].pan_rad - views[0].pan_rad
 
 
 def _across(direction: np.ndarray) -> float:
