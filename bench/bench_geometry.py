@@ -3,7 +3,8 @@
 Ten printed heads, each in a room of its own, in the lockstep simulator: clicks on a cube or a pen at 0.3 to 1.5 m. The
 arms are what metric and controller are given:
 
-- `identified`: the head's own description, or with VERGENCE_GEOMETRY_FOUND=FOLDER the rigs FOLDER/head_SEED.yaml;
+- `identified`: what `vergence identify` finds of the head, before which its cameras have no calibration; with
+  VERGENCE_GEOMETRY_DESCRIBED=1 the head's own description instead, and nothing is identified;
 - `uncalibrated`: the default rig.yaml, its pans' zeros unknown to 0.05 rad, and cameras without a calibration;
 - `principal_point`: the description of heads whose principal points are up to 60 px off.
 
@@ -16,8 +17,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from bench import geometry_identify
 from bench.bench_photos import outcomes_of
-from bench.geometry_heads import FOUND_FOLDER, found_rig
+from bench.geometry_heads import found_rig, identify_head
 from bench.geometry_points import POINTS_OF_A_HEAD, PointTrial, angles_deg
 from bench.geometry_trials import (
     FOUND,
@@ -46,20 +48,24 @@ def run(say: Say, clicks: int | None = None) -> list[Row]:
     # Before numpy is loaded anew in every process: its own threads would only contend.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     clicks = clicks or int(os.environ.get("VERGENCE_GEOMETRY_CLICKS", CLICKS))
-    found = FOUND_FOLDER in os.environ
-    described = FOUND if found else IDENTIFIED
+    described = bool(os.environ.get("VERGENCE_GEOMETRY_DESCRIBED"))
+    arm, rows = IDENTIFIED if described else FOUND, []
+    if not described:
+        heads = outcomes_of(identify_head, range(HEADS), 1, "heads identified", say)
+        rows = geometry_identify.rows(heads, say)
     fewer = max(round(_FEWER * clicks), 1)
-    sg90 = _clicked(trials(described, clicks), "clicks, identified", say)
-    ideal = _clicked(trials(described, fewer, ideal_servos=True), "clicks, identified, ideal servos", say)
+    sg90 = _clicked(trials(arm, clicks), "clicks, identified", say)
+    ideal = _clicked(trials(arm, fewer, ideal_servos=True), "clicks, identified, ideal servos", say)
     uncalibrated = _clicked(trials(UNCALIBRATED, fewer), "clicks, uncalibrated", say)
     principal = _clicked(trials(PRINCIPAL_POINT, fewer), "clicks, principal points off", say)
     for line in failures([*sg90, *ideal, *uncalibrated, *principal]):
         say(line)
     points = [
-        angle for seed in range(HEADS) for angle in angles_deg(PointTrial(seed, found_rig(seed) if found else None))
+        angle for seed in range(HEADS) for angle in angles_deg(PointTrial(seed, None if described else found_rig(seed)))
     ]
     false = float(np.mean([o.falsely_verged for o in (*sg90, *ideal, *uncalibrated, *principal)]))
     return [
+        *rows,
         *identified_rows(sg90, ""),
         *identified_rows(ideal, ".ideal"),
         Row("geometry.point_deg.identified", float(np.median(points)), f"deg, {HEADS * POINTS_OF_A_HEAD} goals"),

@@ -24,7 +24,6 @@ from vergence_sim.parameters import SimParameters
 from vergence_sim.printed_head import printed_head
 from vergence_sim.simulator import Simulator
 
-HEADS = range(10)
 REST_S = 0.45  # a look of a running head: its rest, and the wait for the next pair
 _UNCALIBRATED = "rig.yaml as shipped"
 
@@ -80,24 +79,23 @@ def identified(seed: int) -> tuple[FoundGeometry, Rig, float]:
         return found, head.truth, computing_s + head.simulator.time_s + _timing_moves_s()
 
 
-def run(say: Callable[[str], None]) -> list[Row]:
-    """Identify every head and return the rows."""
+def rows(heads: Sequence[tuple[FoundGeometry, Rig, float]], say: Callable[[str], None]) -> list[Row]:
+    """Return the rows of heads as `identified` returns them."""
     errors, before, took_s = [], [], []
     ratios: list[float] = []
-    for seed in HEADS:
-        found, truth, took = identified(seed)
+    for number, (found, truth, took) in enumerate(heads):
         errors.append(errors_of(found.rig, truth))
         before.append(errors_of(default_rig(), truth))
         ratios += _ratios(found, truth)
         took_s.append(took)
-        say(f"head {seed}: " + ", ".join(f"{name} {value:.3g}" for name, value in errors[-1].items()))
+        say(f"head {number}: " + ", ".join(f"{name} {value:.3g}" for name, value in errors[-1].items()))
     units = {"lens_mm": "mm", "tilt_axis_mm": "mm", "mount_deg": "deg", "zero_deg": "deg", "principal_px": "px"}
-    rows = [Row("geometry.identify_s", float(np.median(took_s)), "s")]
+    found_rows = [Row("geometry.identify_s", float(np.median(took_s)), "s")]
     for name in errors[0]:
         found_error, start_error = (float(np.median([one[name] for one in some])) for some in (errors, before))
-        rows.append(Row(f"geometry.{name}", found_error, units.get(name, "1"), _UNCALIBRATED, start_error))
-    rows.append(Row("geometry.within_two_sigma", float(np.mean(np.abs(ratios) < 2.0)), "share of all values"))
-    return rows
+        found_rows.append(Row(f"geometry.{name}", found_error, units.get(name, "1"), _UNCALIBRATED, start_error))
+    found_rows.append(Row("geometry.within_two_sigma", float(np.mean(np.abs(ratios) < 2.0)), "share of all values"))
+    return found_rows
 
 
 def errors_of(rig: Rig, truth: Rig) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """POINT goals of printed, identified heads by joints alone: no image is taken, so vision corrects nothing."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +23,10 @@ _AWAKE_S, _TURNING_S = 0.3, 1.5
 
 @dataclass(frozen=True)
 class PointTrial:
-    """POINT goals of one head, described by `rig` (None: as it is)."""
+    """POINT goals of one head, described by `rig` (None: as it is).
+
+    The tilt's zero cannot be found by looking, as the whole world may be tilted instead: the true one is given.
+    """
 
     head: int
     rig: Rig | None = None
@@ -32,7 +35,7 @@ class PointTrial:
 def angles_deg(trial: PointTrial) -> list[float]:
     """Return, for each goal, the larger of the angles between the point and both foveas once the joints rest [deg]."""
     head = printed_head(trial.head).with_servos(IDEAL)
-    rig = head if trial.rig is None else trial.rig.with_servos(IDEAL)
+    rig = head if trial.rig is None else _with_tilt_zero(trial.rig, head.tilt.zero_rad).with_servos(IDEAL)
     random = np.random.default_rng([trial.head, 43])
     simulator = Simulator(SimParameters.of({}), rig, render=False, head=head)
     found = []
@@ -43,6 +46,10 @@ def angles_deg(trial: PointTrial) -> list[float]:
         _turn_to(simulator, rig, (float(point_m[0]), float(point_m[1]), float(point_m[2])))
         found.append(math.degrees(max(simulator.angles_to_foveas(point_m))))
     return found
+
+
+def _with_tilt_zero(rig: Rig, zero_rad: float) -> Rig:
+    return replace(rig, joints=replace(rig.joints, tilt=replace(rig.tilt, zero_rad=zero_rad)))
 
 
 def _turn_to(simulator: Simulator, rig: Rig, point_m: tuple[float, float, float]) -> None:

@@ -30,8 +30,8 @@ from vergence_sim.world import EYES
 Array = npt.NDArray[np.float64]
 
 IDENTIFIED, FOUND, UNCALIBRATED, PRINCIPAL_POINT = "identified", "found", "uncalibrated", "principal_point"
-"""What the graph is given: the head's own description, what identify found of it, nothing (no calibration, the default
-rig.yaml), or the description of a head with principal points far off."""
+"""What the graph is given: the head's own description; what identify found of it, its cameras without a calibration;
+nothing (no calibration, the default rig.yaml); or the description of a head with principal points far off."""
 
 NEAREST_M, FARTHEST_M = 0.3, 1.5
 HEADS = 10
@@ -153,7 +153,7 @@ def run(trial: GeometryTrial) -> GeometryOutcome:
     head = head_of(trial)
     rig = rig_given(trial, head)
     values: dict[str, Any] = {"seed": trial.number, "world.seed": trial.head % 8}
-    values |= {"head.camera_info": "none"} if trial.arm == UNCALIBRATED else {}
+    values |= {"head.camera_info": "none"} if trial.arm in (FOUND, UNCALIBRATED) else {}
     random = np.random.default_rng([trial.number, 42])
     with closing(Simulator(SimParameters.of(values), rig, head=head)) as simulator:
         point_m = _placed(simulator, head, random)

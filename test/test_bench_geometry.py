@@ -40,7 +40,7 @@ def test_the_arms_give_what_they_say(monkeypatch, tmp_path):
     assert undescribed.zero_sigma_rad > 0
     found = replace(head, baseline_m=0.0651)
     write_rig(tmp_path / "head_0.yaml", found)
-    monkeypatch.setenv("VERGENCE_GEOMETRY_FOUND", str(tmp_path))
+    monkeypatch.setattr("bench.geometry_heads.FOLDER", tmp_path)
     assert rig_given(replace(TRIAL, arm=FOUND), head) == found
 
 

@@ -293,10 +293,10 @@ def test_pairs_that_come_too_fast_are_dropped_and_counted_but_the_newest(
     begun, go_on = threading.Event(), threading.Event()
     measure = node._measurement.edge
 
-    def slow(left: Pixels, right: Pixels) -> Any:
+    def slow(left: Pixels, right: Pixels, seen_px: int | None) -> Any:
         begun.set()
         assert go_on.wait(60.0)
-        return measure(left, right)
+        return measure(left, right, seen_px)
 
     monkeypatch.setattr(node._measurement, "edge", slow)
     eyes.show(view(0), view(7))
@@ -318,7 +318,7 @@ def test_pairs_that_come_too_fast_are_dropped_and_counted_but_the_newest(
 def test_a_failure_in_the_measurement_is_named_and_survived(
     graph: Any, node: EdgeMetricNode, eyes: Eyes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(left: Pixels, right: Pixels) -> Any:
+    def fail(left: Pixels, right: Pixels, seen_px: int | None) -> Any:
         raise ArithmeticError("of the test")
 
     with monkeypatch.context() as patch:

@@ -25,7 +25,7 @@ class SimulatedHead:
 
     def __init__(self) -> None:
         self.servos = default_servos()
-        self.simulator = simulator.Simulator()
+        self.simulator = simulator.Simulator(simulator.SimParameters.of({"head.model": "rolled"}))
 
     def look(self, joints_rad: Mapping[str, float]) -> dict[str, Image]:
         pulses_us = {name: self.servos[name].pulse_us(angle) for name, angle in joints_rad.items()}

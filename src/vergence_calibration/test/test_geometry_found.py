@@ -9,7 +9,13 @@ import pytest
 import yaml
 
 from vergence_calibration.geometry.geometry_report import geometry_lines, geometry_record
-from vergence_calibration.geometry.identify_geometry import FoundGeometry, Look, identify_geometry, solved
+from vergence_calibration.geometry.identify_geometry import (
+    FoundGeometry,
+    Look,
+    _in_whole_images,
+    identify_geometry,
+    solved,
+)
 from vergence_calibration.geometry.poses import PoseParameters, planned_poses, visited
 from vergence_calibration.geometry.stereo_file import mount_constraint, read_stereo
 from vergence_calibration.geometry.unknowns import index
@@ -246,6 +252,31 @@ def test_what_moves_by_itself_is_refused() -> None:
         )
 
 
+@pytest.mark.parametrize(
+    ("joints", "signs", "reason"),
+    [
+        ([1, 0, 2], [1, 1, 1], "pan_left must turn as joint_states say, .* are the servos or the cameras swapped"),
+        ([0, 1, 2], [-1, -1, 1], "pan_left must turn by 0.5 to 2 times what joint_states say: got -"),
+    ],
+)
+def test_joints_that_turn_otherwise_than_reported_are_named(joints: list[int], signs: list[int], reason: str) -> None:
+    seen, poses = sightings(printed_rig(7), Room(count=400), 7)
+    reported = Poses(poses.joints_rad[:, joints] * signs, poses.arrived[:, joints] * signs)
+    with pytest.raises(IdentifyError, match=reason):
+        solved(default_rig(), cameras_of(default_rig()), reported, seen)
+
+
+def test_a_start_that_is_far_off_is_good_enough() -> None:
+    truth = printed_rig(8)
+    horns = [replace(truth.joints[f"pan_{eye}"], zero_rad=off * DEG) for eye, off in zip(EYES, (10, -10), strict=True)]
+    truth = replace(truth, joints=Joints(horns[0], horns[1], truth.tilt))
+    seen, poses = sightings(truth, Room(), 8)
+    cameras = [camera.replaced(fx_px=700.0, fy_px=700.0) for camera in (default_rig().left_camera,) * 2]
+    start = replace(default_rig(), left_camera=cameras[0], right_camera=cameras[1])
+    for name, (error, _) in errors(solved(start, cameras_of(start), poses, seen), truth).items():
+        assert abs(error) < MOST[name.rpartition(".")[2]], (name, error)
+
+
 class StaringHead:
     """A head whose eyes see one picture, whatever the joints do."""
 
@@ -314,3 +345,17 @@ def test_a_bad_stereo_file_is_named(tmp_path, text: str, reason: str) -> None:
         read_stereo(path)
     with pytest.raises(IdentifyError, match=r"stereo file '.*missing.yaml'"):
         read_stereo(tmp_path / "missing.yaml")
+
+
+def test_sightings_in_reduced_pictures_are_those_of_whole_images() -> None:
+    truth = printed_rig(9)
+    seen, _ = sightings(truth, Room(count=100), 9)
+    whole = _in_whole_images(seen, (2.0, 1.0), cameras_of(default_rig()))
+    left = seen.view % 2 == 0
+    np.testing.assert_allclose(whole.pixels[left], 2.0 * seen.pixels[left] + 0.5)
+    np.testing.assert_allclose(whole.pixels[~left], seen.pixels[~left])
+    calibrated = cameras_of(truth, calibrated=True)
+    straight = _in_whole_images(seen, (1.0, 1.0), calibrated)
+    model = calibrated["left"].model
+    flat = (straight.pixels[straight.view % 2 == 0] - (model.cx_px, model.cy_px)) / (model.fx_px, model.fy_px)
+    np.testing.assert_allclose(model.distort(flat), seen.pixels[left], atol=1e-6)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence_rig.head_bodies import OPTICAL_FRAMES, head_bodies
@@ -54,6 +54,7 @@ def _pose(urdf: ElementTree.Element, link: str, positions: dict[str, float]) -> 
 
 
 @given(_RIGS, _ANGLES)
+@settings(deadline=None)
 def test_the_optical_frames_are_where_the_kinematics_have_the_cameras(rig: Rig, joints: tuple[float, ...]) -> None:
     urdf = ElementTree.fromstring(head_urdf(rig))
     kinematics, eyes = Kinematics(rig), rig.eye_angles(joints)
@@ -64,6 +65,7 @@ def test_the_optical_frames_are_where_the_kinematics_have_the_cameras(rig: Rig, 
 
 
 @given(_RIGS)
+@settings(deadline=None)
 def test_the_joints_have_the_rigs_limits(rig: Rig) -> None:
     joints = {joint.attrib["name"]: joint for joint in ElementTree.fromstring(head_urdf(rig)).iter("joint")}
     for name, spec in rig.joints.items():

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence_rig.kinematics import Kinematics
@@ -30,6 +30,7 @@ def joints_for(head, point_m):
 
 
 @given(HEADS, POINTS)
+@settings(deadline=None)
 def test_mujocos_gaze_is_that_of_the_kinematics(head, point):
     eyes = Kinematics(head).gaze_for_point(point)
     hinges = TrueGaze(head).hinges(np.array(point))

@@ -9,6 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_calibration.eye_turn import Image
+from vergence_calibration.geometry.acceptance import (
+    check_agreement,
+    check_certain,
+    check_joints,
+    check_sightings,
+    check_texture,
+)
 from vergence_calibration.geometry.bundle import BundleAdjustment, Constraint, Solution
 from vergence_calibration.geometry.features import Features, features, matches, neighbours, tracks
 from vergence_calibration.geometry.poses import PoseParameters, planned_poses, visited
@@ -16,28 +23,13 @@ from vergence_calibration.geometry.unknowns import NAMES, Prior, index, prior_of
 from vergence_calibration.geometry.views import HeadViews, Observations, Poses
 from vergence_calibration.identification.axis_log import EYES, EyeCamera, IdentifyError
 from vergence_rig.camera import CameraModel
-from vergence_rig.rig import Rig
+from vergence_rig.rig import JOINT_NAMES, Rig
 
 Array = npt.NDArray[np.float64]
 
 _NEIGHBOURS = 10
-_LEAST_FEATURES, _LEAST_POINTS, _LEAST_SHARED = 80, 150, 60
-_LEAST_IN_VIEW, _LEAST_VIEWS_SHARE = 12, 0.7
-_AGREES, _LEAST_AGREEING = 0.2, 0.5
 _LEARNT = 0.7  # of the prior's standard deviation: what remains more uncertain was not seen
-_DEG = math.pi / 180.0
-_MOST_SIGMA = {
-    "lens_x_m": (0.004, 1e3, "mm"),
-    "lens_y_m": (0.004, 1e3, "mm"),
-    "roll_rad": (0.3 * _DEG, 1 / _DEG, "degrees"),
-    "pitch_rad": (0.3 * _DEG, 1 / _DEG, "degrees"),
-    "zero_rad": (0.4 * _DEG, 1 / _DEG, "degrees"),
-    "scale": (0.02, 1.0, ""),
-    "log_focal": (0.015, 100.0, "%"),
-    "cx_px": (8.0, 1.0, "px"),
-    "cy_px": (8.0, 1.0, "px"),
-}
-"""Largest standard deviation of what an eye needs, its factor and unit for a person."""
+_LEAST_JOINT_SIGMA_RAD = math.radians(0.02)
 _MAY_BE_UNSEEN = (
     *(f"{eye}.{name}" for eye in EYES for name in ("log_aspect", "k1", "k2", "p1", "p2")),
     "lens_z_apart_m",
@@ -121,10 +113,10 @@ def identify_geometry(
         joints_rad.append([float(angle) for angle in look.joints_rad])
         found += [features(look.pictures[eye]) for eye in EYES]
         scales = [look.sizes_px[eye][0] / look.pictures[eye].shape[1] for eye in EYES]
-    _check_texture(found)
+    check_texture(found)
     poses = visited(rig, joints_rad, joints_rad[0])
     seen = _in_whole_images(_tracked(found, rig, cameras, poses), scales, cameras)
-    _check_sightings(seen, len(found))
+    check_sightings(seen, len(found))
     progress(f"  {int(seen.point.max()) + 1} things found again from several poses, {len(seen.view)} sightings")
     return solved(rig, cameras, poses, seen, constraints)
 
@@ -143,21 +135,23 @@ def solved(
     before_px = float(np.median(before.solve(*before.start()).residuals_px))
     adjustment = BundleAdjustment(views, seen, prior, constraints)
     solution = adjustment.solve(*adjustment.start())
-    agreeing = float(np.mean(solution.weights > _AGREES))
-    if agreeing < _LEAST_AGREEING:
-        raise IdentifyError(
-            f"the head must explain {_LEAST_AGREEING:.0%} or more of what its eyes see: got {agreeing:.0%}; does "
-            "something move in view, or do the pans not carry the eyes that their names say?"
-        )
+    check_agreement(solution)
+    check_joints(prior, solution)
     kept = _not_seen(prior, solution)
-    if kept:
-        held = replace(prior, sigmas=np.where(np.isin(NAMES, kept), 0.0, prior.sigmas))
-        adjustment = BundleAdjustment(views, seen, held, constraints)
-        solution = adjustment.solve(*adjustment.start())
+    learnt = replace(
+        prior,
+        sigmas=np.where(np.isin(NAMES, kept), 0.0, prior.sigmas),
+        joint_sigma_rad=_joint_sigmas(solution),
+    )
+    adjustment = BundleAdjustment(views, seen, learnt, constraints)
+    vector = solution.vector.copy()
+    for name in kept:
+        vector[NAMES.index(name)] = prior.means[NAMES.index(name)]
+    solution = adjustment.solve(vector, solution.points)
     sigmas = np.sqrt(np.diag(solution.covariance))
-    _check_certain(sigmas)
+    check_certain(sigmas)
     return FoundGeometry(
-        rig_of(rig, solution.vector[: len(NAMES)], cameras),
+        replace(rig_of(rig, solution.vector[: len(NAMES)], cameras), zero_sigma_rad=_zero_sigma_rad(solution)),
         cameras,
         solution.vector[: len(NAMES)],
         sigmas,
@@ -220,44 +214,17 @@ def _not_seen(prior: Prior, solution: Solution) -> tuple[str, ...]:
     )
 
 
-def _check_texture(found: Sequence[Features]) -> None:
-    counts = np.array([len(features.pixels) for features in found])
-    if np.mean(counts >= _LEAST_FEATURES) < _LEAST_VIEWS_SHARE:
-        raise IdentifyError(
-            f"{_LEAST_VIEWS_SHARE:.0%} of the views must have {_LEAST_FEATURES} or more features for the geometry: "
-            f"got {int(np.median(counts))} in the median view; turn the head to things with texture, in good light"
-        )
+def _joint_sigmas(solution: Solution) -> Array:
+    """Return the standard deviation (3,) of each joint at rest, from how far it was from joint_states at the poses.
+
+    Three degrees of freedom of each joint's deviations are its zero, scale and play.
+    """
+    deviations = solution.vector[len(NAMES) :].reshape(-1, len(JOINT_NAMES))
+    return np.maximum(np.sqrt((deviations**2).sum(axis=0) / (len(deviations) - 3)), _LEAST_JOINT_SIGMA_RAD)
 
 
-def _check_sightings(seen: Observations, views: int) -> None:
-    points = int(seen.point.max(initial=-1)) + 1
-    if points < _LEAST_POINTS:
-        raise IdentifyError(
-            f"{_LEAST_POINTS} or more things must be found again from several poses for the geometry: got {points}; "
-            "turn the head to things with texture that do not move"
-        )
-    enough = float(np.mean(np.bincount(seen.view, minlength=views) >= _LEAST_IN_VIEW))
-    if enough < _LEAST_VIEWS_SHARE:
-        raise IdentifyError(
-            f"{_LEAST_VIEWS_SHARE:.0%} of the views must show {_LEAST_IN_VIEW} or more things that other views show: "
-            f"got {enough:.0%}; turn the head so that things with texture are all around"
-        )
-    left, right = (np.bincount(seen.point[seen.view % 2 == number], minlength=points) > 0 for number in (0, 1))
-    shared = int(np.sum(left & right))
-    if shared < _LEAST_SHARED:
-        raise IdentifyError(
-            f"both eyes must see {_LEAST_SHARED} or more of the same things for the geometry: got {shared}; do both "
-            "look the same way, and is neither covered?"
-        )
-
-
-def _check_certain(sigmas: Array) -> None:
-    for eye in EYES:
-        for name, (most, factor, unit) in _MOST_SIGMA.items():
-            sigma = float(sigmas[index(name, eye)])
-            if not sigma <= most:
-                near = name in ("lens_x_m", "lens_y_m")
-                raise IdentifyError(
-                    f"{name} of the {eye} eye must be found to {factor * most:.2g} {unit}: got {factor * sigma:.2g}; "
-                    + ("turn the head to things at 0.3 to 2 m" if near else "turn the head to more texture all around")
-                )
+def _zero_sigma_rad(solution: Solution) -> float:
+    """Return the standard deviation of each pan's zero that gives that of their difference, the vergence [rad]."""
+    places = [index("zero_rad", eye) for eye in EYES]
+    own = solution.covariance[np.ix_(places, places)]
+    return round(math.sqrt(0.5 * float(own[0, 0] + own[1, 1] - 2.0 * own[0, 1])), 6)

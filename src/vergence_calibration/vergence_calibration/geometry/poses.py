@@ -26,7 +26,7 @@ class PoseParameters(Parameters):
     """How far and how often the head turns for its geometry."""
 
     poses: int = parameter(36, "number of poses", minimum=24, maximum=200)
-    pan_deg: float = parameter(28.0, "largest version, to either side", unit="degrees", minimum=10, maximum=60)
+    pan_deg: float = parameter(42.0, "largest version, to either side", unit="degrees", minimum=10, maximum=60)
     tilt_deg: float = parameter(18.0, "largest tilt, up and down", unit="degrees", minimum=5, maximum=45)
     vergence_deg: float = parameter(18.0, "largest vergence", unit="degrees", minimum=5, maximum=40)
 

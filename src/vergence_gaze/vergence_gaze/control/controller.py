@@ -11,6 +11,7 @@ from vergence_gaze.control.perception import LATEST_FUTURE_S, Perception
 from vergence_gaze.control.report import Command, GazeReport, make_report
 from vergence_gaze.control.search_pattern import Searcher
 from vergence_gaze.control.track_requests import TrackRequests
+from vergence_gaze.estimation.mount_drift import MountDrift
 from vergence_gaze.estimation.observations import JointReport, JointResolution, Observation, PointSighting
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
@@ -43,7 +44,7 @@ class GazeController:
     """
 
     def __init__(self, rig: Rig, parameters: GazeParameters, period_s: float = 0.01) -> None:
-        self._described, self._period_s = rig, period_s
+        self._given, self._described, self._period_s = rig, rig, period_s
         self._rig = rig = rig.in_eye_angles()
         self._limits = CommandLimits(rig)
         self._goals = GoalMonitor()
@@ -75,6 +76,11 @@ class GazeController:
     def vergence_offset(self) -> VergenceOffset:
         """The true vergence relative to the shafts' estimate, by the visual encoder."""
         return self._perception.vergence_offset
+
+    @property
+    def mounts(self) -> MountDrift:
+        """How far the mounts have moved since the head was described, by the visual encoder."""
+        return self._perception.mounts
 
     @property
     def resolution_rad(self) -> Array:
@@ -209,14 +215,24 @@ class GazeController:
             self._follow_stream(now_s)
         verging = self._phases.phase in (Phase.VERGE, Phase.FIXATE)
         self._perception.update(observation, now_s, self._law, verging)
+        if self._perception.mounts_corrected:
+            self._perception.mounts_corrected = False
+            self._describe(self.mounts.corrected(self._given))
 
     def _set_steps(self, resolution: JointResolution) -> None:
-        described = rig_with_steps(self._described, resolution.steps_rad)
-        if described != self._described:
-            self._described = described
-            self._rig = rig = described.in_eye_angles()
-            self._perception.set_rig(rig)
-            self._law = make_law(rig, self._p)
+        self._given = rig_with_steps(self._given, resolution.steps_rad)
+        self._describe(self.mounts.corrected(self._given))
+
+    def _describe(self, rig: Rig) -> None:
+        """Use another description of the head: other steps of its servos, or mounts found to have moved."""
+        if rig == self._described:
+            return
+        if self._command is not None:
+            self._command = np.array(rig.eye_angles(self._described.joint_angles(self._command.tolist())))
+        self._described, self._rig = rig, rig.in_eye_angles()
+        self._limits = CommandLimits(self._rig)
+        self._perception.set_rig(self._rig)
+        self._law = make_law(self._rig, self._p)
 
     def _follow_stream(self, now_s: float) -> None:
         if not self._perception.tracking.follows_stream:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from vergence_gaze.control.vergence_judge import VergenceJudge
 from vergence_gaze.estimation.distance import UNKNOWN, TargetPosition, joint_variances, target_position
 from vergence_gaze.estimation.evidence import Gaussian, probability_beyond_limit
+from vergence_gaze.estimation.mount_drift import MountDrift, MountReading
 from vergence_gaze.estimation.observations import (
     BoxSighting,
     EdgeContrast,
@@ -45,6 +46,7 @@ class Perception:
     def __init__(self, rig: Rig, parameters: GazeParameters, driven: Driven) -> None:
         self._rig, self._described_steps_rad = rig, pulse_steps_rad(rig)
         self.kinematics = Kinematics(rig)
+        self.mounts, self.mounts_corrected = MountDrift(), False
         self.history = ShaftHistory(rig)
         self.image_s = -math.inf
         self._images_fault, self._images_fault_s = "", -math.inf
@@ -88,6 +90,7 @@ class Perception:
         if isinstance(observation, JointReport):
             if self.history.add(observation.stamp_s, observation.positions_rad) and self._moves.update():
                 self.vergence_offset.on_pan_moved(observation.stamp_s)
+                self.mounts_corrected |= self.mounts.on_pan_moved()
             return
         if not (self.history.known and observation.stamp_s <= now_s + LATEST_FUTURE_S < math.inf):
             return
@@ -169,9 +172,15 @@ class Perception:
         return isinstance(observation, BoxSighting) and self.tracking.update_box(observation, now_s)
 
     def _update_rotation(self, seen: EyeRotationObservation) -> None:
-        if seen.usable and self.tracking.eyes_were_still(seen.stamp_s, seen.skew_s):
+        if not self.tracking.eyes_were_still(seen.stamp_s, seen.skew_s):
+            return
+        if seen.contradictory:
+            self.mounts.on_contradiction()
+        if seen.usable:
             left, right, _ = self.history.shaft_at(seen.stamp_s)
-            self.vergence_offset.update(seen.stamp_s, seen.vergence_rad - float(right - left), seen.sigma_rad)
+            off_rad = seen.vergence_rad - float(right - left)
+            self.vergence_offset.update(seen.stamp_s, off_rad, seen.sigma_rad)
+            self.mounts.update(MountReading(off_rad, seen.roll_rad, seen.pitch_rad))
 
     def _update_contrast(self, seen: EdgeContrast, now_s: float, law: Law, verging: bool) -> None:
         self.judge.update_contrast(seen.stamp_s, seen.contrast, now_s)

@@ -194,12 +194,15 @@ class GazeControllerNode(Node):
             return Report(level, report.reason, {"cycles": self._cycles})
         values = {"law": report.law, "mode": report.mode, "verged": report.verged, "cycles": self._cycles}
         values |= {"eye_rotations_accepted": encoder.accepted, "eye_rotations_rejected": encoder.rejected}
+        values |= self._controller.mounts.summary()
         if encoder.rejection:
             values["eye_rotation_rejection"] = encoder.rejection
         if report.fault:
             return Report(ERROR, report.reason, values)
         if report.images_missing:
             return Report(WARN, f"no results from the images arrive: {report.reason}", values)
+        if moved := self._controller.mounts.request:
+            return Report(WARN, moved, values)
         return Report(OK, f"{report.phase.name.lower()}: {report.reason}", values)
 
 
