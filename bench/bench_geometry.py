@@ -9,7 +9,7 @@ arms are what metric and controller are given:
 - `principal_point`: the description of heads whose principal points are up to 60 px off.
 
 `.ideal` rows are of ideal servos. VERGENCE_GEOMETRY_CLICKS sets the clicks of `identified` (100); the other arms have
-0.4 of them.
+0.4 of them; with fewer than ten there are as many heads.
 """
 
 import os
@@ -20,7 +20,7 @@ import numpy as np
 from bench import geometry_identify
 from bench.bench_photos import outcomes_of
 from bench.geometry_heads import found_rig, identify_head
-from bench.geometry_points import POINTS_OF_A_HEAD, PointTrial, angles_deg
+from bench.geometry_points import PointTrial, angles_deg
 from bench.geometry_trials import (
     FOUND,
     HEADS,
@@ -50,9 +50,10 @@ def run(say: Say, clicks: int | None = None) -> list[Row]:
     clicks = clicks or int(os.environ.get("VERGENCE_GEOMETRY_CLICKS", CLICKS))
     described = bool(os.environ.get("VERGENCE_GEOMETRY_DESCRIBED"))
     arm, rows = IDENTIFIED if described else FOUND, []
+    heads = range(min(HEADS, clicks))
     if not described:
-        heads = outcomes_of(identify_head, range(HEADS), 1, "heads identified", say)
-        rows = geometry_identify.rows(heads, say)
+        found = outcomes_of(identify_head, heads, 1, "heads identified", say)
+        rows = geometry_identify.rows(found, say)
     fewer = max(round(_FEWER * clicks), 1)
     sg90 = _clicked(trials(arm, clicks), "clicks, identified", say)
     ideal = _clicked(trials(arm, fewer, ideal_servos=True), "clicks, identified, ideal servos", say)
@@ -60,15 +61,13 @@ def run(say: Say, clicks: int | None = None) -> list[Row]:
     principal = _clicked(trials(PRINCIPAL_POINT, fewer), "clicks, principal points off", say)
     for line in failures([*sg90, *ideal, *uncalibrated, *principal]):
         say(line)
-    points = [
-        angle for seed in range(HEADS) for angle in angles_deg(PointTrial(seed, None if described else found_rig(seed)))
-    ]
+    points = [angle for seed in heads for angle in angles_deg(PointTrial(seed, None if described else found_rig(seed)))]
     false = float(np.mean([o.falsely_verged for o in (*sg90, *ideal, *uncalibrated, *principal)]))
     return [
         *rows,
         *identified_rows(sg90, ""),
         *identified_rows(ideal, ".ideal"),
-        Row("geometry.point_deg.identified", float(np.median(points)), f"deg, {HEADS * POINTS_OF_A_HEAD} goals"),
+        Row("geometry.point_deg.identified", float(np.median(points)), f"deg, {len(points)} goals"),
         _share("geometry.verged.uncalibrated", uncalibrated, [o.on_target for o in uncalibrated]),
         _share("geometry.principal_point", principal, [o.on_target for o in principal]),
         Row("geometry.falsely_verged", false, "share of all clicks"),

@@ -117,12 +117,18 @@ def errors_of(rig: Rig, truth: Rig) -> dict[str, float]:
     return {
         "lens_mm": 1e3 * max(lenses),
         "tilt_axis_mm": 1e3 * float(np.hypot(*axis)),
+        "length": abs(_lens_baseline(found) / _lens_baseline(true) - 1.0),
         "mount_deg": math.degrees(max(mounts)),
         "zero_deg": math.degrees(max(zeros)),
         "scale": max(scales),
         "focal": max(focals),
         "principal_px": max(centres),
     }
+
+
+def _lens_baseline(rig: Rig) -> float:
+    """Return the distance between the lenses with both eyes straight ahead [m]: all distances are as far off."""
+    return rig.baseline_m + rig.left_mount.lens_y_m - rig.right_mount.lens_y_m
 
 
 def _heights(rig: Rig) -> tuple[float, float]:

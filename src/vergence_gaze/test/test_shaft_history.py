@@ -34,7 +34,7 @@ def worst_rad(servo: ServoSpec, commands_known: bool, report_phase_s: float = 0.
         if tick % 20 == 0:
             plant.command(math.radians(60.0) * now_s, now_s)
             if commands_known:
-                history.on_command(now_s)
+                history.on_command(now_s, np.zeros(3))
     for time_s, true_rad in samples:
         if 0.1 < time_s < 0.5:
             worst = max(worst, abs(float(history.shaft_at(time_s)[0]) - true_rad))
@@ -53,7 +53,7 @@ def test_commands_give_when_the_eyes_turned(servo: ServoSpec, report_phase_s: fl
 def test_a_servo_whose_command_fell_on_a_report_turns_right_after_it() -> None:
     history = ShaftHistory(rig_with(IDEAL))
     history.add(1.0, positions(0.0))
-    history.on_command(1.0)
+    history.on_command(1.0, np.zeros(3))
     history.add(1.02, positions(0.05))
     speed = IDEAL.speed_rad_s
     assert history.reported_at(1.0 + 0.02 / speed)[0] == pytest.approx(0.02)
@@ -64,7 +64,7 @@ def test_a_servo_whose_command_fell_on_a_report_turns_right_after_it() -> None:
 def test_a_command_takes_effect_after_the_latency() -> None:
     history = ShaftHistory(rig_with(NO_PLAY))
     history.add(1.0, positions(0.0))
-    history.on_command(1.0)
+    history.on_command(1.0, np.zeros(3))
     history.add(1.02, positions(0.05))
     assert history.reported_at(1.014)[0] == pytest.approx(0.0)
     assert history.reported_at(1.0149 + 0.05 / NO_PLAY.speed_rad_s)[0] == pytest.approx(0.05, abs=2e-3)
@@ -101,8 +101,18 @@ def test_slip_is_the_speed_beside_the_targets() -> None:
 def test_a_clock_that_was_set_forgets_the_commands_too() -> None:
     history = ShaftHistory(rig_with(IDEAL))
     history.add(10.0, positions(0.0))
-    history.on_command(10.0)
+    history.on_command(10.0, np.zeros(3))
     assert history.add(1.0, positions(0.0))
-    history.on_command(1.0)
+    history.on_command(1.0, np.zeros(3))
     history.add(1.02, positions(0.05))
     assert history.reported_at(1.015)[0] == pytest.approx(0.05)
+
+
+def test_what_was_sent_since_an_exposure_is_known() -> None:
+    history = ShaftHistory(default_rig())
+    assert history.sent_since(1.0) == 0.0
+    for sent_s, pan_rad in ((1.0, 0.1), (1.02, 0.1), (1.04, 0.13)):
+        history.on_command(sent_s, np.array([pan_rad, 0.0, 0.0]))
+    assert history.sent_since(1.03) == pytest.approx(0.03)
+    assert history.sent_since(1.05) == 0.0
+    assert history.sent_since(0.5) == 0.0  # before the first command nothing was sent

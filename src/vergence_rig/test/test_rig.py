@@ -1,6 +1,7 @@
 """The rig's description: defaults, YAML, and errors that name the key, the value and what is allowed."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,8 @@ from vergence_rig.testing.odd_heads import SHARES, odd_head
 CONFIG = Path(__file__).resolve().parents[3] / "config" / "rig.yaml"
 
 
-def test_shipped_yaml_equals_the_built_in_rig() -> None:
-    assert load_rig(CONFIG) == default_rig()
+def test_shipped_yaml_is_the_built_in_rig_of_a_head_not_yet_identified() -> None:
+    assert load_rig(CONFIG) == replace(default_rig(), zero_sigma_rad=0.05)
 
 
 def test_empty_path_is_the_built_in_rig() -> None:

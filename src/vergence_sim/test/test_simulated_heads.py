@@ -35,7 +35,8 @@ def test_mujocos_gaze_is_that_of_the_kinematics(head, point):
     eyes = Kinematics(head).gaze_for_point(point)
     hinges = TrueGaze(head).hinges(np.array(point))
     yaws = (head.left_mount.yaw_rad, head.right_mount.yaw_rad, 0.0)
-    assert hinges + yaws == pytest.approx([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad], abs=1e-8)
+    # MuJoCo takes frames that differ by a millionth for the same.
+    assert hinges + yaws == pytest.approx([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad], abs=5e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -8,7 +8,7 @@ from vergence_rig.rig import CameraSpec, EyeMount, Joints, Rig
 from vergence_rig.rig_file import load_rig
 from vergence_sim.printed_head import printed_head
 
-DEFAULT_MODEL = "rolled"
+DEFAULT_MODEL = "printed"
 """The head that is simulated where none is named: equal to the shipped sim_node.yaml and photo_node.yaml."""
 MODELS = ("printed", "rolled", "ideal", "rig")
 """The values of `head.model` that are no path."""

@@ -198,7 +198,7 @@ class GazeController:
         self._note_limits(desired)
         self._command, self._command_s = sent, max(now_s, self._command_s)
         if sending:
-            self._perception.history.on_command(now_s)
+            self._perception.history.on_command(now_s, sent)
         if not fault:
             self._update_goal(now_s)
         joints_rad = np.array(self._described.joint_angles(sent.tolist())) if sending else None

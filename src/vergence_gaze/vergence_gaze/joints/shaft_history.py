@@ -37,7 +37,7 @@ class ShaftHistory:
         self._speed = np.array([servo.speed_rad_s for servo in servos])
         self._latency = np.array([servo.command_latency_s for servo in servos])
         self._longest_latency_s = float(self._latency.max())
-        self._commands_s: deque[float] = deque(maxlen=_MOST_COMMANDS)
+        self._commands: deque[tuple[float, Array]] = deque(maxlen=_MOST_COMMANDS)
         self._reported = JointHistory(_KEEP_S, _HOLD_S)
         self._shafts = JointHistory(_KEEP_S, _HOLD_S)
 
@@ -93,12 +93,17 @@ class ShaftHistory:
         """Remove all reports and commands."""
         self._reported.clear()
         self._shafts.clear()
-        self._commands_s.clear()
+        self._commands.clear()
 
-    def on_command(self, now_s: float) -> None:
-        """Record that a command is sent now: the joints begin to turn after it by their servos' latency."""
-        if not self._commands_s or now_s > self._commands_s[-1]:
-            self._commands_s.append(now_s)
+    def on_command(self, now_s: float, angles_rad: Array) -> None:
+        """Record a command (3,) that is sent now: the joints begin to turn after it by their servos' latency."""
+        if not self._commands or now_s > self._commands[-1][0]:
+            self._commands.append((now_s, angles_rad))
+
+    def sent_since(self, stamp_s: float) -> float:
+        """Return how far the newest command is from the last one before a stamp, of the farthest joint [rad]."""
+        before = next((angles for sent_s, angles in reversed(self._commands) if sent_s <= stamp_s), None)
+        return 0.0 if before is None else float(np.abs(self._commands[-1][1] - before).max())
 
     def covers(self, stamp_s: float) -> bool:
         """Return whether the angles at `stamp_s` are known: not before the first report, nor long after the last."""
@@ -140,7 +145,7 @@ class ShaftHistory:
 
     def _onset_s(self, begin_s: float, end_s: float) -> Array | None:
         """Return when each joint (3,) began to turn between two reports, None without a command for it."""
-        for command_s in reversed(self._commands_s):
+        for command_s, _ in reversed(self._commands):
             if command_s + self._longest_latency_s < begin_s:
                 return None
             onset_s = command_s + self._latency
