@@ -79,6 +79,12 @@ class Goals:
         self._executor.spin_once(timeout_sec=0.2)
         return self._client.server_is_ready() and self._pose.get_subscription_count() > 0
 
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._client.destroy()
+        self.node.destroy_node()
+
     def one(self) -> bool:
         """Look at a new place; return whether the eyes verged on it within the period."""
         end_s = time.monotonic() + PERIOD_S
@@ -108,7 +114,7 @@ class Goals:
 def segments(pid: int | str) -> set[Path]:
     """Return the shared-memory segments that a process has mapped: its own, and those of the graph that it reads."""
     lines = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace").splitlines()
-    paths = (line.split(maxsplit=5)[5] for line in lines if f"{_SHM}/" in line)
+    paths = (line.split(maxsplit=5)[5] for line in lines if f"{_SHM}/fast" in line)
     return {Path(path) for path in paths if not path.endswith("(deleted)")}
 
 
@@ -123,8 +129,10 @@ def run(duration_s: float) -> list[Row]:
             os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
             context = Context()
             rclpy.init(args=[], context=context, domain_id=domain)
-            samples, verged = _soak(Goals(context), nodes, duration_s)
+            goals = Goals(context)
+            samples, verged = _soak(goals, nodes, duration_s)
             mapped = segments("self").union(*(segments(nodes.pid(name)) for name in NODES))
+            goals.close()
             context.try_shutdown()
     left = sum(path.exists() for path in mapped)
     for name, of_node in samples.items():
