@@ -234,9 +234,10 @@ class Perception:
         self.judge.update_target(stamp_s, error, direction_error)
         # Eyes that passed over the target at the exposure are elsewhere by now; eyes that were on it for long stay.
         on_target = self._on_target(now_s) or self.judge.long_on_target(now_s)
-        # Since the exposure a correction may have been sent: until it has ended, one eye is ahead of the other.
+        # Since the exposure a correction may have been sent: until it has ended, one eye is ahead of the other. A small
+        # one has mostly ended by the time this is known.
         turned_rad = float(np.abs(self.history.reported_rad - self.history.reported_at(stamp_s)).max())
-        correcting = not along and max(turned_rad, self.history.sent_since(stamp_s)) > self.judge.enter_rad
+        correcting = not along and max(turned_rad, 0.5 * self.history.sent_since(stamp_s)) > self.judge.enter_rad
         steady = certain and on_target and not sweeping and not correcting
         probability = 1.0
         # A target that moves, or may move, can be elsewhere by now: there one pair is never enough.
