@@ -122,7 +122,7 @@ def run(duration_s: float) -> list[Row]:
     """Run the soak and return its rows."""
     mapped: set[Path] = set()
     with own_domain() as domain:
-        commands = simulated_head(config_dir() / "rig.yaml", preset="realistic")
+        commands = simulated_head(config_dir() / "rig.yaml", **{"head.model": "ideal"})
         with ProcessGroup(results.OUT_DIR / "soak_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes:
             for name in NODES:
                 nodes.start(name, commands[name])
