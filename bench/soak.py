@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -30,6 +31,7 @@ DURATION_S, PERIOD_S, SAMPLE_S = 3600.0, 5.0, 10.0
 NODES = ("sim_node", "edge_metric_node", "gaze_controller_node")
 _WARM_SHARE = 0.25  # of the duration: caches fill, and count for no slope
 _START_S = 60.0
+_WORLD: dict[str, Any] = {"head.model": "ideal"}
 _SHM = Path("/dev/shm")
 
 
@@ -122,7 +124,7 @@ def run(duration_s: float) -> list[Row]:
     """Run the soak and return its rows."""
     mapped: set[Path] = set()
     with own_domain() as domain:
-        commands = simulated_head(config_dir() / "rig.yaml", **{"head.model": "ideal"})
+        commands = simulated_head(config_dir() / "rig.yaml", **_WORLD)
         with ProcessGroup(results.OUT_DIR / "soak_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes:
             for name in NODES:
                 nodes.start(name, commands[name])
