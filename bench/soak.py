@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -30,6 +31,7 @@ DURATION_S, PERIOD_S, SAMPLE_S = 3600.0, 5.0, 10.0
 NODES = ("sim_node", "edge_metric_node", "gaze_controller_node")
 _WARM_SHARE = 0.25  # of the duration: caches fill, and count for no slope
 _START_S = 60.0
+_WORLD: dict[str, Any] = {"head.model": "ideal"}
 _SHM = Path("/dev/shm")
 
 
@@ -79,6 +81,12 @@ class Goals:
         self._executor.spin_once(timeout_sec=0.2)
         return self._client.server_is_ready() and self._pose.get_subscription_count() > 0
 
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown()
+        self._client.destroy()
+        self.node.destroy_node()
+
     def one(self) -> bool:
         """Look at a new place; return whether the eyes verged on it within the period."""
         end_s = time.monotonic() + PERIOD_S
@@ -108,7 +116,7 @@ class Goals:
 def segments(pid: int | str) -> set[Path]:
     """Return the shared-memory segments that a process has mapped: its own, and those of the graph that it reads."""
     lines = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace").splitlines()
-    paths = (line.split(maxsplit=5)[5] for line in lines if f"{_SHM}/" in line)
+    paths = (line.split(maxsplit=5)[5] for line in lines if f"{_SHM}/fast" in line)
     return {Path(path) for path in paths if not path.endswith("(deleted)")}
 
 
@@ -116,15 +124,17 @@ def run(duration_s: float) -> list[Row]:
     """Run the soak and return its rows."""
     mapped: set[Path] = set()
     with own_domain() as domain:
-        commands = simulated_head(config_dir() / "rig.yaml", preset="realistic")
+        commands = simulated_head(config_dir() / "rig.yaml", **_WORLD)
         with ProcessGroup(results.OUT_DIR / "soak_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes:
             for name in NODES:
                 nodes.start(name, commands[name])
             os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
             context = Context()
             rclpy.init(args=[], context=context, domain_id=domain)
-            samples, verged = _soak(Goals(context), nodes, duration_s)
+            goals = Goals(context)
+            samples, verged = _soak(goals, nodes, duration_s)
             mapped = segments("self").union(*(segments(nodes.pid(name)) for name in NODES))
+            goals.close()
             context.try_shutdown()
     left = sum(path.exists() for path in mapped)
     for name, of_node in samples.items():

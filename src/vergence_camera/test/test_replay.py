@@ -21,6 +21,7 @@ from vergence_camera.errors import (
     UnsupportedError,
 )
 from vergence_camera.frame import Clock, Encoding, Frame, ModeRequest
+from vergence_camera.pixels import decode
 from vergence_camera.sources.recordings import AviRecording, FolderRecording, open_recording
 from vergence_camera.sources.replay import Replay
 
@@ -223,7 +224,7 @@ def test_a_cut_jpeg_of_a_folder_is_played_where_corrupt_frames_are_not_dropped(
         assert source.read(1.0) is not None
 
 
-def test_a_picture_that_exif_turns_comes_out_turned(
+def test_a_picture_that_exif_turns_is_as_the_sensor_took_it(
     tmp_path: Path, make_jpeg: Callable[..., bytes], replay: Play
 ) -> None:
     directory = b"II*\0\x08\0\0\0\x01\0" + struct.pack("<HHIHH", 274, 3, 1, 6, 0) + bytes(4)
@@ -231,7 +232,8 @@ def test_a_picture_that_exif_turns_comes_out_turned(
     data = make_jpeg(0, 320, 240)
     (tmp_path / "a.jpg").write_bytes(data[:2] + b"\xff\xe1" + struct.pack(">H", len(payload) + 2) + payload + data[2:])
     source = replay(tmp_path)
-    assert (source.open().width_px, source.open().height_px) == (240, 320)
+    assert (source.open().width_px, source.open().height_px) == (320, 240)
     frame = source.read(1.0)
     assert frame is not None
-    assert (frame.width_px, frame.height_px, frame.encoding) == (240, 320, Encoding.BGR)
+    pixels, encoding = decode(frame)
+    assert (pixels.shape, encoding) == ((240, 320, 3), "bgr8")

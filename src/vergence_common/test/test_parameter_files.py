@@ -66,6 +66,7 @@ def test_the_full_name_of_a_node(arguments: list[str], name: str) -> None:
         ("/**: {ros__parameters: {a: [1, x]}}", "'a' must be a list of values of one type"),
         ("/**: {ros__parameters: {a: [[1]]}}", "'a' must be a list of values of one type"),
         ("/**: {ros__parameters: {a: 9223372036854775808}}", "a number of 64 bits"),
+        ("/**: {ros__parameters: {a: 5.0e-324}}", "parameter 'a' must be 0 or at least 2.22507e-308"),
         ("/**: {ros__parameters: {a: {b: 1}, a.b: 2}}", r"parameter 'a\.b' must stand once"),
         ("edge: {ros__parameters: {a: 1}}", "it has them for /edge; write '/\\*\\*/servo_node:'"),
         ("servo_nod: {ros__parameters: {a: 1}}", "it has them for /servo_nod"),
@@ -95,7 +96,7 @@ def test_sections_may_be_nested_by_namespace(tmp_path: Path) -> None:
     assert [section.pattern for section in read_parameter_file(tmp_path / "f.yaml")] == ["/head/left/camera_node"]
 
 
-_SCALARS = st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False)
+_SCALARS = st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False, allow_subnormal=False)
 _TEXTS = st.text(st.characters(exclude_categories=["Cs", "Cc", "Cn"], exclude_characters="\ufeff"), max_size=20)
 
 

@@ -9,6 +9,7 @@ import json
 import math
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -133,6 +134,8 @@ def _checked(name: str, value: Any) -> Any:
                 f"parameter '{name}' must be true or false, a number of 64 bits, a text, or a list of one of them: "
                 f"got {shown(value)}{hint}"
             )
+        if isinstance(value, float) and 0 < abs(value) < sys.float_info.min:
+            raise ParameterFileError(f"parameter '{name}' must be 0 or at least {sys.float_info.min:g}: got {value:g}")
         return value
     elements: list[Any] = [e if isinstance(e, list) else _checked(name, e) for e in value]
     kinds = {type(element) for element in elements}

@@ -100,7 +100,7 @@ def _from_files(collector: ViewCollector, left: Sequence[Path], right: Sequence[
 
 def _picture(file: Path) -> Pixels:
     try:
-        return read_picture(file, cv2.IMREAD_GRAYSCALE)
+        return read_picture(file, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
     except FileError as error:
         raise FileError(f"not readable as images: {file} {error}") from error
 

@@ -13,7 +13,6 @@ from vergence_camera.jpeg import JPEG_START, inspect_jpeg
 from vergence_camera.sources.avi_demuxer import frames, is_avi, read_header
 from vergence_camera.sources.replay import Picture, Recording
 from vergence_camera.sources.requested_mode import mode_of
-from vergence_rig.exif import is_turned
 from vergence_rig.picture_file import check_size, decode_picture
 from vergence_rig.regular_file import FileError, check_regular_file, read_regular_file
 
@@ -91,8 +90,8 @@ class VideoRecording:
 class FolderRecording:
     """A folder of pictures, in natural order of their names; JPEGs pass through untouched.
 
-    Hidden files, folders, pipes and devices are not looked at. A JPEG that its EXIF orientation turns is decoded, so
-    that it comes out as every viewer shows it.
+    Hidden files, folders, pipes and devices are not looked at. EXIF orientation is ignored: pictures are as the sensor
+    took them, which is what a calibration is of.
     """
 
     def __init__(self, path: Path) -> None:
@@ -143,7 +142,7 @@ class FolderRecording:
                 return decode_picture(data, cv2.IMREAD_ANYCOLOR)
             info = inspect_jpeg(data, must_be_whole=False)
             check_size(info.width_px, info.height_px)
-            return decode_picture(data) if is_turned(data) else data
+            return data
         except FileError as error:
             return CorruptFrameError(f"{file} {error}")
         except CorruptFrameError as error:

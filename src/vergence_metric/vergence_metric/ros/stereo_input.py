@@ -312,9 +312,10 @@ class StereoInput:
         return Report(OK, f"{counts.pairs} pairs", values)
 
     def _cameras_report(self) -> Report:
-        faults = [self._camera_fault(side) for side in (LEFT, RIGHT)]
-        worst = max(faults, key=lambda one: one[0])
-        return Report(*worst) if worst[1] else Report(OK, "camera_info received from both cameras")
+        faults = [(self._info_errors[side] is not None, *self._camera_fault(side)) for side in (LEFT, RIGHT)]
+        # Of two as bad, what was refused tells more than what has not come.
+        _, level, text = max(faults, key=lambda one: (one[1], one[0]))
+        return Report(level, text) if text else Report(OK, "camera_info received from both cameras")
 
     def _camera_fault(self, side: int) -> tuple[int, str]:
         """Return level and text of what is wrong with a camera's description; OK and "" if nothing is."""
