@@ -1,6 +1,7 @@
 """Kinematics: inverse and forward agree, Jacobians are those of differences, the ideal head is a special case."""
 
 import math
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -134,6 +135,15 @@ def test_a_rig_with_mounts_is_written_and_read(rig: Rig) -> None:
 def test_errors_name_the_key(document: dict[str, Any], named: str) -> None:
     with pytest.raises(RigError, match=named):
         rig_from_mapping(document)
+
+
+@given(_RIGS, _between(1.5), _between(1.5), _between(0.8))
+def test_any_angles_have_a_point_or_an_error(rig: Rig, version: float, vergence: float, tilt: float) -> None:
+    k = Kinematics(rig)
+    point = k.far_point(g.from_version_vergence(version, vergence, tilt))
+    assert all(math.isfinite(value) for value in (point.x, point.y, point.z, point.w))
+    with suppress(g.GeometryError):  # the axes need not meet
+        assert np.isfinite(k.point_at(version, vergence, tilt)).all()
 
 
 def test_points_without_a_gaze_are_refused() -> None:

@@ -241,11 +241,13 @@ class Kinematics:
         if self.pitch_rad == 0.0 and z_left == z_right:
             return z_left
         z = 0.5 * (z_left + z_right) - math.tan(self.pitch_rad) * 0.5 * (s_left + s_right)
+        if min(s_left, s_right) <= 0.0:
+            return z  # not before both eyes: no angle down
+        reach = 0.5 * (s_left + s_right)
         for _ in range(_STEPS):
             down = 0.5 * (math.atan2(z_left - z, s_left) + math.atan2(z_right - z, s_right)) - self.pitch_rad
             slope = -0.5 * sum(s / (s * s + (h - z) ** 2) for h, s in heights)
-            step = -down / slope
-            z += step
+            z += max(-reach, min(reach, -down / slope))
             if abs(down) < _CONVERGED_RAD:
                 break
         return z
