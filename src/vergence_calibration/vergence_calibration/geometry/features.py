@@ -84,9 +84,12 @@ def matches(first: Features, second: Features) -> Indices:
     found = np.flatnonzero(clear & (back[there] == rows))
     if len(found) < _LEAST_MATCHES:
         return none
-    _, agree = cv2.findFundamentalMat(
-        first.pixels[found], second.pixels[there[found]], cv2.USAC_MAGSAC, _EPIPOLAR_PX, 0.999, 2000
-    )
+    try:
+        _, agree = cv2.findFundamentalMat(
+            first.pixels[found], second.pixels[there[found]], cv2.USAC_MAGSAC, _EPIPOLAR_PX, 0.999, 2000
+        )
+    except cv2.error:  # OpenCV 5 asserts where every model it drew was degenerate
+        return none
     if agree is None:
         return none
     kept = found[agree.ravel() == 1]
