@@ -102,7 +102,8 @@ class Perception:
         if not isinstance(observation, PointSighting):
             if self.images_fault(now_s):
                 return
-            self.image_s = now_s
+            if now_s - observation.stamp_s <= self._p.control.no_images_s:
+                self.image_s = now_s  # older ones show nothing of the present
             self.exposure_s = observation.stamp_s
         if isinstance(observation, EdgeContrast):
             self._update_contrast(observation, now_s, law, verging)
