@@ -4,6 +4,8 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 
 import numpy as np
@@ -20,6 +22,9 @@ from vergence_bringup.testing.textured_wall import TexturedWall
 from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
 from vergence_metric.ros.edge_metric_node import EdgeMetricNode
 from vergence_msgs.msg import GazeState
+from vergence_rig.rig import default_rig
+from vergence_rig.rig_file import write_rig
+from vergence_rig.servo import IDEAL
 
 NAMED_WITHIN_S, RECOVERED_WITHIN_S = 2.0, 5.0
 """Limits of a fault's diagnostic after it begins, and of its absence after it ends [s]."""
@@ -68,11 +73,16 @@ class FaultTrial:
         self.verged = False
         self._since_s, self._false = math.inf, 0
         self.head = FaultyHead(TexturedWall(), context=self._context)
-        verge = [Parameter("start", value="verge")]
+        self._folder = TemporaryDirectory()
+        # The joints of this head are where they are commanded: servos with play would be steered against theirs.
+        rig = Path(self._folder.name) / "rig.yaml"
+        write_rig(rig, default_rig().with_servos(IDEAL))
+        described = Parameter("rig", value=str(rig))
+        verge = Parameter("start", value="verge")
         self._nodes: list[Node] = [
             self.head,
-            EdgeMetricNode(context=self._context),
-            GazeControllerNode(context=self._context, parameter_overrides=verge),
+            EdgeMetricNode(context=self._context, parameter_overrides=[described]),
+            GazeControllerNode(context=self._context, parameter_overrides=[described, verge]),
             Node("fault_trial", context=self._context),
         ]
         for node in self._nodes:
@@ -93,6 +103,7 @@ class FaultTrial:
             node.destroy_node()
         self._executor.shutdown()
         self._context.try_shutdown()
+        self._folder.cleanup()
 
     def wait_until_verged(self, timeout_s: float = 60.0) -> bool:
         """Run until the eyes are verged; return whether they are."""
