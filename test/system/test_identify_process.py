@@ -34,7 +34,7 @@ def processes(domain_id: int, tmp_path: Path) -> Iterator[ProcessGroup]:
 
 def start_head(processes: ProcessGroup, *remappings: str, **head: Any) -> None:
     # Few frames a second: many tests may share this machine.
-    parameters = {"servo_latency_s": SLOW_S, "camera.frame_rate_hz": 15.0} | head
+    parameters = {"servo_latency_s": SLOW_S, "camera.frame_rate_hz": 15.0, "head.model": "rolled"} | head
     processes.start("sim", NodeCommand.of("sim_node", parameters, remappings))
 
 

@@ -15,13 +15,14 @@ from vergence_bringup.testing.textured_wall import FOCAL_PX, HEIGHT_PX, WIDTH_PX
 from vergence_common.images import array_to_image
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds
-from vergence_rig.rig import JOINT_NAMES
+from vergence_rig.rig import JOINT_NAMES, default_rig
+from vergence_rig.servo import ServoPlant
 
 TICK_S = 0.025
 _TICKS_OF_A_PAIR = 2
-_SPEED_RAD_S = 4.0
 EYES = ("left", "right")
 
+Array = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.uint8]
 
 
@@ -44,8 +45,8 @@ class FaultyHead(Node):
     def __init__(self, wall: TexturedWall, **options: Any) -> None:
         super().__init__("faulty_head", **options)
         self.wall = wall
-        self.joints_rad = np.zeros(3)
-        self._wanted_rad = np.zeros(3)
+        # Servos as rig.yaml describes them: those that have no play would be steered against it.
+        self._servos = [ServoPlant(joint.servo) for _, joint in default_rig().joints.items()]
         self._ticks = 0
         self.heal()
         self._images = [self.create_publisher(Image, f"{eye}/image_raw", IMAGE_QOS) for eye in EYES]
@@ -53,6 +54,11 @@ class FaultyHead(Node):
         self._joints = self.create_publisher(JointState, "joint_states", 10)
         self.create_subscription(JointState, "joint_command", self._on_command, 10)
         self.create_timer(TICK_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    @property
+    def joints_rad(self) -> Array:
+        """True angles of the joints (3,)."""
+        return np.array([servo.true_rad for servo in self._servos])
 
     def heal(self) -> None:
         """Publish everything as it is."""
@@ -66,15 +72,17 @@ class FaultyHead(Node):
         return float(self.joints_rad[1] - self.joints_rad[0] - self.wall.needed_rad)
 
     def _on_command(self, message: JointState) -> None:
-        by_name = dict(zip(message.name, message.position, strict=False))
-        self._wanted_rad = np.array([by_name.get(n, old) for n, old in zip(JOINT_NAMES, self._wanted_rad, strict=True)])
+        for name, angle_rad in zip(message.name, message.position, strict=False):
+            if name in JOINT_NAMES:
+                self._servos[JOINT_NAMES.index(name)].command(angle_rad, self._ticks * TICK_S)
 
     def _tick(self) -> None:
         self.wall.step(TICK_S)
-        step = _SPEED_RAD_S * TICK_S
-        self.joints_rad = self.joints_rad + np.clip(self._wanted_rad - self.joints_rad, -step, step)
+        for servo in self._servos:
+            servo.step((self._ticks + 1) * TICK_S)
         now_ns = self.get_clock().now().nanoseconds
-        joints = JointState(header=self._header(now_ns, ""), name=list(JOINT_NAMES), position=self.joints_rad.tolist())
+        reported = [servo.modelled_rad for servo in self._servos]
+        joints = JointState(header=self._header(now_ns, ""), name=list(JOINT_NAMES), position=reported)
         for message in self.report(joints):
             self._joints.publish(message)
         self._ticks += 1
