@@ -316,7 +316,12 @@ class GazeController:
             eyes_still=self._perception.eyes_still(state.now_s, state.commanded_rad, self._law.lands_at_rest),
             travel_s=float((np.abs(residual) / state.speed_rad_s).max()),
             verged=self._perception.judge.verged,
-            may_search=tracking.class_name is not None or tracking.follows_stream or lost_s > self._p.search.after_s,
+            # Without images there is nothing to be found in them; a stream of points needs none.
+            may_search=tracking.follows_stream
+            or (
+                not self._perception.images_missing(state.now_s)
+                and (tracking.class_name is not None or lost_s > self._p.search.after_s)
+            ),
         )
 
     def _note_limits(self, desired: Array) -> None:
