@@ -28,8 +28,7 @@ _VERSION = (1.0, 0.0, 0.0)
 
 _WITHOUT_DEPTH = 0.25  # coefficient of the vergence in rows that do not tell it: the left pan's is about -0.5
 
-LARGEST_TANGENT = 10.0
-"""Of normalised coordinates: no lens sees farther aside."""
+_LARGEST_TANGENT = 10.0  # of normalised coordinates: no lens sees farther aside
 _WIDEST_RAD = 1.5
 
 
@@ -185,7 +184,14 @@ def _tangent(angle_rad: float) -> float:
     return math.tan(angle_rad) if abs(angle_rad) < _WIDEST_RAD else math.nan
 
 
+def unseen_by_any_lens(normalised: tuple[float, ...]) -> str:
+    """Return what is wrong with normalised coordinates, "" if a lens can see them."""
+    if all(abs(value) <= _LARGEST_TANGENT for value in normalised):
+        return ""
+    shown = ", ".join(f"{value:g}" for value in normalised)
+    return f"normalised coordinates must be within +-{_LARGEST_TANGENT:g}: got ({shown})"
+
+
 def _check(normalised: tuple[float, ...]) -> None:
-    if not all(abs(value) <= LARGEST_TANGENT for value in normalised):
-        shown = ", ".join(f"{value:g}" for value in normalised)
-        raise SightingError(f"normalised coordinates must be within +-{LARGEST_TANGENT:g}: got ({shown})")
+    if fault := unseen_by_any_lens(normalised):
+        raise SightingError(fault)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vergence_gaze.estimation.directions import LARGEST_TANGENT, spread_of_eye
+from vergence_gaze.estimation.directions import spread_of_eye, unseen_by_any_lens
 from vergence_gaze.estimation.rays import gaze_of_ray, gaze_of_rays
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result
 from vergence_gaze.joints.shaft_history import ShaftHistory
@@ -147,13 +147,8 @@ def _angles(eyes: EyeAngles) -> Array:
 
 
 def _check_seen(what: str, normalised: tuple[float, ...]) -> None:
-    if not all(abs(value) <= LARGEST_TANGENT for value in normalised):
-        shown = ", ".join(f"{value:g}" for value in normalised)
-        raise GoalError(
-            Result.INVALID,
-            f"{what} must be one that the lens can see: normalised coordinates must be within +-{LARGEST_TANGENT:g}, "
-            f"got ({shown})",
-        )
+    if fault := unseen_by_any_lens(normalised):
+        raise GoalError(Result.INVALID, f"{what} must be one that the lens can see: {fault}")
 
 
 def _check_reach(joints_rad: dict[str, float], rig: Rig, parameters: GazeParameters) -> None:

@@ -24,6 +24,8 @@ _WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context 
 _WIDE_REACH_PX = 16  # that parallax may move the point beside it
 _CONTEXT_HALF_PX, _CONTEXT_SCALE = 48, 2  # on photographs the smallest that rarely errs
 _POINT_HALF_PX = 16
+NEVER = -1.0
+"""No correlation is below it."""
 _ALONE_LEAD = 0.3  # in correlation, over any other place: without its surroundings a point must be unmistakable
 _CANDIDATES = 3
 _APART_PX = 12.0  # two peaks of the context closer than this are one place
@@ -58,8 +60,18 @@ class RememberedPatch:
         self._levels = {scale: _reduced(image, scale) for scale in (1, _CONTEXT_SCALE, _WIDE_SCALE)}
         self._reaches = _reaches(image, pixel)
 
-    def find(self, image: Image, view: EyeView, direction: NDArray[np.float64], reach_px: int) -> PatchSighting | None:
-        """Return where it is, expected within `reach_px` of `direction` (3,) in rig_base; None outside the image."""
+    def find(
+        self,
+        image: Image,
+        view: EyeView,
+        direction: NDArray[np.float64],
+        reach_px: int,
+        alone_below: float = NEVER,
+    ) -> PatchSighting | None:
+        """Return where it is, expected within `reach_px` of `direction` (3,) in rig_base; None outside the image.
+
+        Where its surroundings are less similar than `alone_below`, the point itself counts if it is unmistakable.
+        """
         expected, height, width = view.pixel(direction), *image.shape
         if not (-reach_px <= expected[0] < width + reach_px and -reach_px <= expected[1] < height + reach_px):
             return None
@@ -75,16 +87,16 @@ class RememberedPatch:
             off = math.hypot(place[0] - expected[0], place[1] - expected[1]) / reach
             found.append((similarity + at_point - prior * off**2, similarity, at_point, pixel))
         _, similarity, at_point, pixel = max(found)
-        return PatchSighting(pixel, similarity, at_point, min(spread_px, wide_spread_px))
+        sighting = PatchSighting(pixel, similarity, at_point, min(spread_px, wide_spread_px))
+        if similarity >= alone_below:
+            return sighting
+        return self._alone(image, view, expected, reach, prior) or sighting
 
-    def find_alone(
-        self, image: Image, view: EyeView, direction: NDArray[np.float64], reach_px: int
-    ) -> PatchSighting | None:
+    def _alone(self, image: Image, view: EyeView, expected: Pixel, reach: int, prior: float) -> PatchSighting | None:
         """Return where the point itself is, whatever surrounds it now; None unless it is unmistakable.
 
         A lens that lies off the axes moves as the eye turns: what stands near has another background then.
         """
-        expected, reach, prior, _ = self._about(image, view, view.pixel(direction), reach_px)
         places, spread_px = self._places(image, view, expected, reach, (_POINT_HALF_PX, 1), 2, prior)
         best, second = [*(similarity for _, similarity in places), 0.0, 0.0][:2]
         if second > best - _ALONE_LEAD:

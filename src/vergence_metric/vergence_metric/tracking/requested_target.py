@@ -8,7 +8,7 @@ from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, Di
 from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.parameters import TrackerParameters
-from vergence_metric.tracking.remembered_patch import RememberedPatch
+from vergence_metric.tracking.remembered_patch import NEVER, RememberedPatch
 from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.sighted import in_both_eyes, in_left_eye
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
@@ -117,13 +117,11 @@ def find_by_surroundings(
     if target.hidden:
         reach_px = p.request_search_px + p.search_growth_px_s * (stamp_s - target.seen_s)
         reach_px = min(reach_px, p.request_search_max_px)
-    found = patch.find(left, view, target.direction, round(reach_px))
+    alone_below = p.request_similarity if target.hidden else NEVER
+    found = patch.find(left, view, target.direction, round(reach_px), alone_below)
     if found is None:
         return None
     alike = found.similarity >= p.request_similarity
-    if not alike and target.hidden:
-        found = patch.find_alone(left, view, target.direction, round(reach_px)) or found
-        alike = found.similarity >= p.request_similarity
     if target.found and not (alike and (target.hidden or found.at_point >= p.anchor_similarity)):
         return None
     if alike and target.hidden:
