@@ -17,7 +17,7 @@ from vergence_gaze.parameters import GazeNodeParameters
 from vergence_metric.measurement.parameters import pair_measurement_parameters
 from vergence_rig.camera import CameraModel
 from vergence_rig.eye_image import eye_images
-from vergence_rig.rig import JOINT_NAMES, Rig
+from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
 from vergence_rig.rig_file import load_rig
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Head:
         cls,
         target_m: Sequence[float] = (0.8, 0.0, 0.0),
         *,
-        rig: Rig | str | Path = "",
+        rig: Rig | str | Path | None = None,
         simulation: Mapping[str, Any] = _NONE,
         gaze: Mapping[str, Any] = _NONE,
         metric: Mapping[str, Any] = _NONE,
@@ -73,18 +73,20 @@ class Head:
 
         Args:
             target_m: place of the target, a Rubik's cube unless `simulation` says otherwise, in rig_base (3,) [m].
-            rig: a rig, or the path of a rig.yaml; the built-in one if empty.
+            rig: what controller and metric are given: a rig, or the path of a rig.yaml, empty for the built-in one; None
+                for the head as it is built, as if it had been identified.
             simulation: parameters of sim_node by their full names, such as {"target.object": "marker"}.
             gaze: see `Head`.
             metric: see `Head`.
         """
         # MuJoCo is needed for this alone.
         from vergence.simulated_body import SimulatedBody
+        from vergence_sim.heads import simulated_head
         from vergence_sim.parameters import SimParameters
         from vergence_sim.simulator import Simulator
 
-        described = _rig(rig)
-        parameters = SimParameters.of(simulation)
+        parameters = SimParameters.of(simulation).effective()
+        described = simulated_head(parameters.head, default_rig()) if rig is None else _rig(rig)
         world = Simulator(parameters, described)
         try:
             world.place_target(parameters.target.object, target_m)
@@ -99,7 +101,7 @@ class Head:
         left: str | Path,
         right: str | Path,
         *,
-        rig: Rig | str | Path = "",
+        rig: Rig | str | Path | None = None,
         simulation: Mapping[str, Any] = _NONE,
         gaze: Mapping[str, Any] = _NONE,
         metric: Mapping[str, Any] = _NONE,
@@ -115,14 +117,17 @@ class Head:
             metric: see `Head`.
         """
         from vergence.simulated_body import SimulatedBody
+        from vergence_sim.heads import simulated_head
         from vergence_sim.parameters import SimParameters
         from vergence_sim.photo.pair import read_pair
         from vergence_sim.photo.parameters import PhotoParameters
         from vergence_sim.photo.world import PhotoWorld, cropped
 
         photo = PhotoParameters(left=str(left), right=str(right))
-        described = cropped(_rig(rig), photo.view_width_px, photo.view_height_px)
-        world = PhotoWorld(read_pair(photo.left, photo.right), SimParameters.of(simulation), described)
+        parameters = SimParameters.of(simulation).effective()
+        whole = simulated_head(parameters.head, default_rig()) if rig is None else _rig(rig)
+        described = cropped(whole, photo.view_width_px, photo.view_height_px)
+        world = PhotoWorld(read_pair(photo.left, photo.right), parameters, described)
         return cls(SimulatedBody(world, described), gaze=gaze, metric=metric)
 
     @classmethod
@@ -139,7 +144,7 @@ class Head:
         Args:
             bag: folder or .mcap file of a recording; see docs/recordings.md.
             namespace: of the head in it; None for the only one that there is.
-            rig: see `simulated`.
+            rig: a rig, or the path of a rig.yaml; the built-in one if empty.
             metric: see `Head`.
         """
         # rosbags is needed for this alone.
