@@ -73,8 +73,8 @@ class Head:
 
         Args:
             target_m: place of the target, a Rubik's cube unless `simulation` says otherwise, in rig_base (3,) [m].
-            rig: what controller and metric are given: a rig, or the path of a rig.yaml, empty for the built-in one; None
-                for the head as it is built, as if it had been identified.
+            rig: what controller and metric are given: a rig or the path of a rig.yaml, empty for the built-in one;
+                None for the head as it is built, as if it had been identified.
             simulation: parameters of sim_node by their full names, such as {"target.object": "marker"}.
             gaze: see `Head`.
             metric: see `Head`.

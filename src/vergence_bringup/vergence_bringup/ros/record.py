@@ -80,7 +80,8 @@ class Recording:
 
     def __init__(self, node: Node, writer: BagWriter, topics: tuple[str, ...]) -> None:
         self._node, self._writer = node, writer
-        self._clock_ns: int | None = None
+        self.clock_ns: int | None = None
+        """The time of /clock, None before its first message."""
         self._first_ns = self._last_ns = 0
         self._topics = topics
         node.create_subscription(Clock, "/clock", self._on_clock, QoSProfile(depth=1, reliability=_BEST_EFFORT))
@@ -100,7 +101,7 @@ class Recording:
 
     def run(self, stop_asked: threading.Event, duration_s: float | None, wait_s: float) -> None:
         """Record until the event is set or the time is over. Raises GraphError where nothing comes within `wait_s`."""
-        executor = SingleThreadedExecutor()
+        executor = SingleThreadedExecutor(context=self._node.context)
         executor.add_node(self._node)
         wait_until_s = time.monotonic() + wait_s
         try:
@@ -117,10 +118,10 @@ class Recording:
             executor.shutdown()
 
     def _on_clock(self, message: Clock) -> None:
-        self._clock_ns = to_nanoseconds(message.clock)
+        self.clock_ns = to_nanoseconds(message.clock)
 
     def _write(self, topic: str, kind: str, latched: bool, data: bytes) -> None:
-        now_ns = time.time_ns() if self._clock_ns is None else self._clock_ns
+        now_ns = time.time_ns() if self.clock_ns is None else self.clock_ns
         if not self._writer.counts:
             self._first_ns = now_ns
         self._last_ns = now_ns
