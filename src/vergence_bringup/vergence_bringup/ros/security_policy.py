@@ -19,6 +19,11 @@ SOMETIMES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "gaze_controller_node": ((), ("/vergence/edge", "/tf", "/tf_static")),
 }
 """Topics that a node publishes and subscribes only with some parameters or installed packages."""
+OPTIONAL_ACTIONS = {
+    "gaze_controller_node": ("/gaze/point_head",),
+    "servo_node": ("/servo_node/follow_joint_trajectory",),
+}
+"""Actions that a node serves only where their messages are installed."""
 CLOCK = "/clock"
 """Subscribed by every node that uses simulated time."""
 
@@ -62,7 +67,10 @@ def with_sometimes(executable: str, endpoints: Endpoints) -> Endpoints:
     """Return what a node is allowed: what it has, and what it has sometimes."""
     publish, subscribe = SOMETIMES.get(executable, ((), ()))
     return replace(
-        endpoints, publish=endpoints.publish.union(publish), subscribe=endpoints.subscribe.union(subscribe, (CLOCK,))
+        endpoints,
+        publish=endpoints.publish.union(publish),
+        subscribe=endpoints.subscribe.union(subscribe, (CLOCK,)),
+        execute=endpoints.execute.union(OPTIONAL_ACTIONS.get(executable, ())),
     )
 
 

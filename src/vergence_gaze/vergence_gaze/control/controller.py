@@ -26,6 +26,8 @@ from vergence_gaze.laws import make_law
 from vergence_gaze.laws.protocol import ControlInput
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.phases import Phase, PhaseMachine, Situation
+from vergence_rig.geometry import from_version_vergence
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
@@ -55,6 +57,7 @@ class GazeController:
         self._command_s = math.nan
         self._send_until_s = -math.inf
         self._beyond_limits = False
+        self._goal_speed_rad_s = math.inf
         self._feedback = FeedbackMonitor()
         self._perception = Perception(rig, parameters, _driven(parameters))
         self._configure(parameters)
@@ -88,6 +91,11 @@ class GazeController:
         return pulse_steps_rad(self._described)
 
     @property
+    def kinematics(self) -> Kinematics:
+        """Those of the head as it is described now."""
+        return self._perception.kinematics
+
+    @property
     def goal_id(self) -> int | None:
         """The active goal, None if there is none."""
         return self._goals.goal_id
@@ -119,7 +127,8 @@ class GazeController:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
         self._goals.end(Result.PREEMPTED, "preempted by a newer goal", now_s)
-        self._goals.start(goal_id, goal, now_s, self._p)
+        self._goal_speed_rad_s, slow_s = self._pace(goal, request)
+        self._goals.start(goal_id, goal, now_s, self._p, slow_s)
         self._feedback.retry()
         self._active, self._pose, self._verges_on_sight = True, None, False
         self._perception.judge.restart()
@@ -148,6 +157,31 @@ class GazeController:
             raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
         kinematics, history = self._perception.kinematics, self._perception.history
         return resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
+
+    def _pace(self, goal: Goal, request: RequestedTarget | RequestedPose | ClassRequest) -> tuple[float, float]:
+        """Return the largest speed of a goal [rad/s], and how much time it takes longer than at full speed [s]."""
+        if isinstance(request, ClassRequest):
+            return goal.max_speed_rad_s, 0.0
+        if isinstance(request, RequestedPose):
+            wanted = request.joints_rad
+        else:
+            eyes = from_version_vergence(*(float(angle) for angle in request.angles_rad))
+            wanted = np.array([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad])
+        travel_rad = np.abs(np.where(self._driven, wanted - self._perception.history.reported_rad, 0.0))
+        longest_rad = float(travel_rad.max())
+        speed_rad_s = goal.max_speed_rad_s
+        if goal.min_duration_s > 0 and longest_rad > 0:
+            speed_rad_s = min(speed_rad_s, longest_rad / goal.min_duration_s)
+        full_s = float((travel_rad / self._limits.speed_rad_s).max())
+        slow_s = max(longest_rad / speed_rad_s if math.isfinite(speed_rad_s) else 0.0, goal.min_duration_s)
+        return speed_rad_s, max(slow_s - full_s, 0.0)
+
+    @property
+    def _speed_rad_s(self) -> Array:
+        """The largest speeds of the joints (3,) now: their own, or the active goal's."""
+        if self._goals.goal_id is None:
+            return self._limits.speed_rad_s
+        return np.minimum(self._limits.speed_rad_s, self._goal_speed_rad_s)
 
     def cancel(self, now_s: float, goal_id: int | None = None) -> bool:
         """End the active goal (or only if it is `goal_id`) as CANCELLED and hold still; False if there is none."""
@@ -200,7 +234,11 @@ class GazeController:
             self._command, self._command_s = self._limits.nearest(self._perception.history.reported_rad), now_s
         desired = self._decide(now_s, self._command) if self._active else self._rest
         sent = self._limits.limited(
-            desired, self._command, now_s - self._command_s, self._perception.history.reported_rad
+            desired,
+            self._command,
+            now_s - self._command_s,
+            self._perception.history.reported_rad,
+            self._speed_rad_s,
         )
         self._note_limits(desired)
         self._command, self._command_s = sent, max(now_s, self._command_s)
@@ -267,7 +305,7 @@ class GazeController:
         resting = situation.eyes_still and situation.residual_rad <= self._p.saccade.threshold_rad
         self._requests.ask_at_point(resting, now_s)
         if phase is Phase.SEARCH:
-            place = self._searcher.next_pose(now_s, self._perception.history.shaft_rad, self._limits.speed_rad_s)
+            place = self._searcher.next_pose(now_s, self._perception.history.shaft_rad, self._speed_rad_s)
             return np.where(self._driven, place, np.nan)
         self._searcher.stop()
         if phase in (Phase.LOST, Phase.IDLE):
@@ -301,7 +339,7 @@ class GazeController:
             shaft_rad=self._perception.history.shaft_rad,
             commanded_rad=command,
             driven=self._driven,
-            speed_rad_s=self._limits.speed_rad_s,
+            speed_rad_s=self._speed_rad_s,
             lead_s=self._lead_s,
             half_play_rad=self._perception.history.half_play_rad,
         )

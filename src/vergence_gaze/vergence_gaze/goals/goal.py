@@ -38,7 +38,8 @@ class Goal:
     """One request. Pixels come as normalised, undistorted coordinates (x right, y down), points in rig_base.
 
     `stamp_s` is the stamp of the image that pixels were read from; NaN for the newest. `depth_m` is along the eye's
-    ray, NaN if unknown. `left_eye` says which eye a single pixel is of.
+    ray, NaN if unknown. `left_eye` says which eye a single pixel is of. While the goal is active no joint turns faster
+    than `max_speed_rad_s`, nor so fast that it would take less than `min_duration_s`.
     """
 
     kind: GoalKind
@@ -53,6 +54,8 @@ class Goal:
     class_name: str = ""
     stamp_s: float = math.nan
     time_limit_s: float = 0.0
+    max_speed_rad_s: float = math.inf
+    min_duration_s: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -56,10 +56,10 @@ class GoalMonitor:
         """Record the outcome of a goal that was never started."""
         self._outcomes.append(Outcome(goal_id, result, reason, 0.0))
 
-    def start(self, goal_id: int, goal: Goal, now_s: float, parameters: GazeParameters) -> None:
-        """Make a goal the active one."""
+    def start(self, goal_id: int, goal: Goal, now_s: float, parameters: GazeParameters, slow_s: float = 0.0) -> None:
+        """Make a goal the active one; `slow_s` is how much longer it takes for what it asks for."""
         self._goal_id, self._since_s = goal_id, now_s
-        self._limit_s = goal.time_limit_s or parameters.control.time_limit_s
+        self._limit_s = goal.time_limit_s or parameters.control.time_limit_s + slow_s
         self._limited_since_s = self._ambiguous_since_s = self._faulty_since_s = math.nan
 
     def end(self, result: Result, reason: str, now_s: float) -> None:
