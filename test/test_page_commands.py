@@ -34,6 +34,7 @@ APT = {
     "python3-venv",
     "ros-dev-tools",
     "ros-jazzy-control-msgs",
+    "ros-jazzy-foxglove-bridge",
     "ros-jazzy-ros-base",
 }
 """Packages that Ubuntu 24.04 or ROS's own repository have; there is no pigpio, and no pigpiod."""
