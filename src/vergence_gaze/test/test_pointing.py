@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vergence_gaze.control.controller import GazeController
-from vergence_gaze.estimation.observations import Observation
+from vergence_gaze.estimation.observations import JointReport, Observation
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Outcome, Result
 from vergence_gaze.goals.pointing import check_axis, pointing_error_rad
 from vergence_gaze.parameter_groups import gaze_parameters
@@ -63,14 +63,14 @@ def test_the_error_is_0_at_the_point_and_what_the_pan_is_off_beside_it(x: float,
     assert pointing_error_rad("", (x, y, z), beside, KINEMATICS) == off_rad
 
 
-def pointed(**pace: float) -> tuple[Outcome, float]:
+def pointed(images: bool = True, **pace: float) -> tuple[Outcome, float]:
     """Return how a goal at a point ended, and the largest commanded speed until then [rad/s]."""
     head = FakeHead(RIG, lambda time_s: np.array(POINT_M), seed=2)
     controller = GazeController(RIG, gaze_parameters(), CONTROL_TICKS * TICK_S)
     arrived: list[Observation] = []
     fastest_rad_s, last, asked = 0.0, np.zeros(3), False
     while head.time_s < 20.0:
-        arrived += head.advance()
+        arrived += [one for one in head.advance() if images or isinstance(one, JointReport)]
         if round(head.time_s / TICK_S) % CONTROL_TICKS:
             continue
         if head.time_s > 0.2 and not asked:
@@ -110,3 +110,11 @@ def test_it_takes_no_less_than_the_asked_time() -> None:
 def test_a_pace_that_cannot_be_is_refused(pace: dict[str, float]) -> None:
     with pytest.raises(GoalError, match="must be"):
         pointed(**pace)
+
+
+@pytest.mark.parametrize("pace", [{}, {"max_speed_rad_s": 0.1}], ids=["at full speed", "slowly"])
+def test_without_images_the_joints_alone_reach_a_point_that_needs_none(pace: dict[str, float]) -> None:
+    outcome, _ = pointed(images=False, needs_images=False, **pace)
+    assert outcome.result is Result.AT_POINT, outcome
+    failed, _ = pointed(images=False, **pace)
+    assert failed.result is Result.NO_IMAGES

@@ -40,6 +40,7 @@ class PointHeadServer(GoalServer):
             point_m=self._place(request),
             max_speed_rad_s=request.max_velocity or math.inf,
             min_duration_s=duration.sec + duration.nanosec * 1e-9,
+            needs_images=False,
         )
 
     def _place(self, request: Any) -> tuple[float, float, float]:
