@@ -1,7 +1,7 @@
 """What a page asks of the head: goals of gaze/look_at, and the services that stop, enable and park it."""
 
 import math
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -13,8 +13,7 @@ from vergence_common.stamps import from_nanoseconds
 from vergence_msgs.action import LookAt
 from vergence_rig.rig import Rig
 from vergence_web.requests import Answer, Command, DetectedClass, Message, Pixel
-
-Reply = Callable[[Answer], None]
+from vergence_web.ros.answering import Reply, answering
 
 _GAZE, _SERVO = "gaze_controller_node", "servo_node"
 _SERVICES = {
@@ -83,16 +82,18 @@ class HeadCommands:
         self._count += 1
         number = self._count
         sent = self._look_at.send_goal_async(goal)
-        sent.add_done_callback(lambda future: self._on_accepted(number, future, message, reply))
+        accepted = partial(self._on_accepted, number, message, reply)
+        sent.add_done_callback(answering(self._node, message, reply, accepted))
 
-    def _on_accepted(self, number: int, future: Any, message: Message, reply: Reply) -> None:
+    def _on_accepted(self, number: int, message: Message, reply: Reply, future: Any) -> None:
         handle = future.result()
         if not handle.accepted:
             reply(Answer(message.number, False, "gaze/look_at refused the goal"))
             return
         self._goals[number] = (handle, message, reply)
         reply(Answer(message.number, True, "the goal is accepted", last=False))
-        handle.get_result_async().add_done_callback(lambda done: self._on_result(number, done))
+        ended = answering(self._node, message, reply, partial(self._on_result, number))
+        handle.get_result_async().add_done_callback(ended)
 
     def _on_result(self, number: int, future: Any) -> None:
         _, message, reply = self._goals.pop(number, (None, None, None))
@@ -127,7 +128,8 @@ class HeadCommands:
             result = future.result()
             reply(Answer(message.number, bool(result.success), str(result.message)[:300] or command))
 
-        client.call_async(kind.Request() if value is None else kind.Request(data=value)).add_done_callback(answer)
+        called = client.call_async(kind.Request() if value is None else kind.Request(data=value))
+        called.add_done_callback(answering(self._node, message, reply, answer))
 
 
 def _result_name(result: int) -> str:

@@ -16,7 +16,8 @@ from vergence_rig.rig_file import load_rig
 from vergence_web.access import Access, is_loopback, page_urls, read_token
 from vergence_web.network import own_addresses
 from vergence_web.parameters import GROUPS, WebNodeParameters
-from vergence_web.requests import Answer, ListNodes, Message, ReadParameters, SetParameter
+from vergence_web.requests import ListNodes, Message, ReadParameters, SetParameter
+from vergence_web.ros.answering import Reply, answering
 from vergence_web.ros.graph_input import GraphInput
 from vergence_web.ros.head_commands import HeadCommands
 from vergence_web.ros.node_parameters import NodeParameters
@@ -26,8 +27,6 @@ from vergence_web.update import Part
 from vergence_web.viewers import Viewers
 
 _CHECK_S = 1.0
-
-Reply = Callable[[Answer], None]
 
 
 class WebNode(Node):
@@ -112,14 +111,7 @@ class WebNode(Node):
         """Perform what a page asks for; called in the server's thread."""
         of_parameters = isinstance(message.request, (ListNodes, ReadParameters, SetParameter))
         part = self._node_parameters if of_parameters else self._commands
-        self._run_soon(lambda: self._perform(part.perform, message, reply))
-
-    def _perform(self, perform: Callable[[Message, Reply], None], message: Message, reply: Reply) -> None:
-        try:
-            perform(message, reply)
-        except Exception as error:  # what a page asks for must never end the node
-            self.get_logger().error(f"a request of a page failed: {type(error).__name__}: {error}")
-            reply(Answer(message.number, False, f"it failed: {type(error).__name__}: {error}"))
+        self._run_soon(lambda: answering(self, message, reply, part.perform)(message, reply))
 
     def _report(self) -> Report:
         count = len(self._viewers)
