@@ -2,6 +2,7 @@
 
 import math
 from functools import partial
+from time import monotonic
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -14,7 +15,9 @@ from vergence_msgs.action import LookAt
 from vergence_rig.rig import Rig
 from vergence_web.requests import Answer, Command, DetectedClass, Message, Pixel
 from vergence_web.ros.answering import Reply, answering
+from vergence_web.ros.service_calls import ServiceCalls
 
+_ACCEPTED_WITHIN_S = 5.0
 _GAZE, _SERVO = "gaze_controller_node", "servo_node"
 _SERVICES = {
     "stop": (Trigger, f"{_GAZE}/stop", None),
@@ -31,7 +34,9 @@ class HeadCommands:
     def __init__(self, node: Node, rig: Rig) -> None:
         self._node, self._rig = node, rig
         self._look_at = ActionClient(node, LookAt, "gaze/look_at")
-        self._clients = {name: node.create_client(kind, name) for kind, name, _ in _SERVICES.values()}
+        self._services = ServiceCalls(node)
+        self._clients = {name: self._services.client(name, kind) for kind, name, _ in _SERVICES.values()}
+        self._sent: dict[int, tuple[float, Message, Reply]] = {}
         self._goals: dict[int, tuple[Any, Message, Reply]] = {}
         self._count = 0
 
@@ -52,7 +57,12 @@ class HeadCommands:
             self._look(self._goal(request), message, reply)
 
     def check(self) -> None:
-        """Answer the goals whose controller has gone: nothing else will."""
+        """Answer the goals whose controller has gone, and those that it has not received: nothing else will."""
+        for number, (until_s, message, reply) in list(self._sent.items()):
+            if monotonic() > until_s:
+                del self._sent[number]
+                text = f"gaze/look_at has not answered within {_ACCEPTED_WITHIN_S:g} s: try again"
+                reply(Answer(message.number, False, text))
         if self._goals and not self._look_at.server_is_ready():
             for _, message, reply in self._goals.values():
                 reply(Answer(message.number, False, f"{_GAZE} has gone: the goal has no result"))
@@ -81,12 +91,17 @@ class HeadCommands:
             return
         self._count += 1
         number = self._count
+        self._sent[number] = (monotonic() + _ACCEPTED_WITHIN_S, message, reply)
         sent = self._look_at.send_goal_async(goal)
         accepted = partial(self._on_accepted, number, message, reply)
         sent.add_done_callback(answering(self._node, message, reply, accepted))
 
     def _on_accepted(self, number: int, message: Message, reply: Reply, future: Any) -> None:
         handle = future.result()
+        if self._sent.pop(number, None) is None:  # too late: the page shows that it failed
+            if handle.accepted:
+                handle.cancel_goal_async()
+            return
         if not handle.accepted:
             reply(Answer(message.number, False, "gaze/look_at refused the goal"))
             return
@@ -118,18 +133,16 @@ class HeadCommands:
 
     def _call(self, command: str, message: Message, reply: Reply) -> None:
         kind, name, value = _SERVICES[command]
-        client = self._clients[name]
-        if not client.service_is_ready():
+        if not self._clients[name].service_is_ready():
             full = self._node.resolve_service_name(name)
             reply(Answer(message.number, False, f"nothing serves {full}: {name.partition('/')[0]} does"))
             return
 
-        def answer(future: Any) -> None:
-            result = future.result()
+        def answer(result: Any) -> None:
             reply(Answer(message.number, bool(result.success), str(result.message)[:300] or command))
 
-        called = client.call_async(kind.Request() if value is None else kind.Request(data=value))
-        called.add_done_callback(answering(self._node, message, reply, answer))
+        asked = kind.Request() if value is None else kind.Request(data=value)
+        self._services.call(name, kind, asked, answering(self._node, message, reply, answer))
 
 
 def _result_name(result: int) -> str:

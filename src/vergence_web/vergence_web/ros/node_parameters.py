@@ -10,7 +10,7 @@ from rclpy.node import Node
 from vergence_web.requests import Answer, ListNodes, Message, ReadParameters, SetParameter
 from vergence_web.ros.answering import Reply, answering
 from vergence_web.ros.parameter_values import entry, plain, typed
-from vergence_web.ros.service_calls import ServiceCalls
+from vergence_web.ros.service_calls import Call, ServiceCalls
 
 _ANSWERED_WITHIN_S = 5.0
 _LIST = "/list_parameters"
@@ -22,7 +22,7 @@ class NodeParameters:
 
     def __init__(self, node: Node) -> None:
         self._node, self._services = node, ServiceCalls(node)
-        self._waiting: dict[int, tuple[float, Message, Reply]] = {}
+        self._waiting: dict[int, tuple[float, _Exchange]] = {}
         self._count = 0
 
     def perform(self, message: Message, reply: Reply) -> None:
@@ -36,18 +36,16 @@ class NodeParameters:
                 reply(Answer(message.number, False, f"node must be one that runs here: got {request.node!r}"))
                 return
             self._count += 1
-            self._waiting[self._count] = (monotonic() + _ANSWERED_WITHIN_S, message, reply)
             exchange = _Exchange(self._node, self._services, message, partial(self._end, self._count, reply))
+            self._waiting[self._count] = (monotonic() + _ANSWERED_WITHIN_S, exchange)
             exchange.read(request) if isinstance(request, ReadParameters) else exchange.set(request)
 
     def check(self) -> None:
         """Answer what has waited for too long: the node has gone, or hangs."""
         now_s = monotonic()
-        for key, (until_s, message, reply) in list(self._waiting.items()):
+        for until_s, exchange in list(self._waiting.values()):
             if now_s > until_s:
-                text = f"the node does not answer within {_ANSWERED_WITHIN_S:g} s"
-                self._end(key, reply, Answer(message.number, False, text))
-                self._services.give_up()
+                exchange.give_up(f"the node does not answer within {_ANSWERED_WITHIN_S:g} s")
 
     def forget(self) -> None:
         """Leave the services: no page is open."""
@@ -70,9 +68,17 @@ class _Exchange:
 
     def __init__(self, node: Node, services: ServiceCalls, message: Message, end: Reply) -> None:
         self._node, self._services, self._message, self._end = node, services, message, end
+        self._newest: Call | None = None
+
+    def give_up(self, text: str) -> None:
+        """Answer that it failed, and wait for no answer."""
+        if self._newest is not None:
+            self._services.abandon(self._newest)
+        self._answer(False, text)
 
     def _call(self, of: str, service: str, kind: Any, request: Any, then: Any) -> None:
-        self._services.call(f"{of}/{service}", kind, request, answering(self._node, self._message, self._end, then))
+        guarded = answering(self._node, self._message, self._end, then)
+        self._newest = self._services.call(f"{of}/{service}", kind, request, guarded)
 
     def _answer(self, ok: bool, text: str, **values: Any) -> None:
         self._end(Answer(self._message.number, ok, text, values))

@@ -1,13 +1,31 @@
-"""Calls of services of other nodes, by clients that are made when they are needed first."""
+"""Calls of services of other nodes that are sent again until they are answered: each may be made twice.
+
+A client sees a service before the service sees the client, and what is answered meanwhile is lost.
+"""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from time import monotonic
 from typing import Any
 
 from rclpy.client import Client
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-_LOOK_S = 0.02
+_LOOK_S, _AGAIN_S = 0.02, 1.0
+_MOST = 100
+"""Calls that wait at a time; the oldest is abandoned for one more."""
+
+
+@dataclass(eq=False)
+class Call:
+    """One call: its answer is passed to `then`, once; `future` is of the last time that it was sent."""
+
+    client: Client
+    request: Any
+    then: Callable[[Any], None]
+    future: Any = None
+    sent_s: float = 0.0
 
 
 class ServiceCalls:
@@ -16,43 +34,62 @@ class ServiceCalls:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._clients: dict[str, Client] = {}
-        self._unready: list[tuple[Client, Any, Callable[[Any], None]]] = []
+        self._calls: list[Call] = []
         self._timer: Any = None
 
-    def call(self, service: str, kind: Any, request: Any, then: Callable[[Any], None]) -> None:
-        """Call a service by its full name, and then `then` with its answer; never, where nothing answers."""
+    def client(self, service: str, kind: Any) -> Client:
+        """Return the client of a service."""
         if service not in self._clients:
             self._clients[service] = self._node.create_client(kind, service)
-        self._unready.append((self._clients[service], request, then))
-        self._send_ready()
+        return self._clients[service]
+
+    def call(self, service: str, kind: Any, request: Any, then: Callable[[Any], None]) -> Call:
+        """Call a service, and then `then` with its answer; it is sent until it is answered or abandoned."""
+        if len(self._calls) >= _MOST:
+            self.abandon(self._calls[0])
+        call = Call(self.client(service, kind), request, then)
+        self._calls.append(call)
+        self._send_due()
+        return call
+
+    def abandon(self, call: Call) -> None:
+        """Wait no longer for an answer."""
+        if call in self._calls:
+            self._calls.remove(call)
+        if call.future is not None:
+            call.client.remove_pending_request(call.future)
 
     def forget(self) -> None:
-        """Leave every service; what has not been answered never will be."""
-        self._unready.clear()
-        self._send_ready()
+        """Leave every service, and wait for no answer."""
+        for call in list(self._calls):
+            self.abandon(call)
+        self._send_due()
         for client in self._clients.values():
             self._node.destroy_client(client)
         self._clients.clear()
 
-    def give_up(self) -> None:
-        """Send nothing more to services that are not there yet."""
-        self._unready.clear()
-
-    def _send_ready(self) -> None:
-        """Send what its service is there for: the discovery of a new client takes a moment."""
-        waiting, self._unready = self._unready, []
-        for client, request, then in waiting:
-            if client.service_is_ready():
-                client.call_async(request).add_done_callback(_with_result(then))
-            else:
-                self._unready.append((client, request, then))
-        if self._unready and self._timer is None:
+    def _send_due(self) -> None:
+        """Send what its service is there for, and again what has not been answered."""
+        now_s = monotonic()
+        for call in list(self._calls):
+            due = call.future is None or now_s - call.sent_s > _AGAIN_S
+            if due and call.client.service_is_ready():
+                self._send(call, now_s)
+        if self._calls and self._timer is None:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self._timer = self._node.create_timer(_LOOK_S, self._send_ready, clock=steady)
-        elif not self._unready and self._timer is not None:
+            self._timer = self._node.create_timer(_LOOK_S, self._send_due, clock=steady)
+        elif not self._calls and self._timer is not None:
             self._node.destroy_timer(self._timer)
             self._timer = None
 
+    def _send(self, call: Call, now_s: float) -> None:
+        if call.future is not None:
+            call.client.remove_pending_request(call.future)
+        call.future, call.sent_s = call.client.call_async(call.request), now_s
 
-def _with_result(then: Callable[[Any], None]) -> Callable[[Any], None]:
-    return lambda future: then(future.result())
+        def answered(future: Any) -> None:
+            if call in self._calls and not future.cancelled():
+                self._calls.remove(call)
+                call.then(future.result())
+
+        call.future.add_done_callback(answered)
