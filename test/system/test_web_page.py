@@ -235,7 +235,7 @@ def test_parameters_are_edited(head: Head, browser: Browser) -> None:
             "s.dispatchEvent(new Event('change')); })()"
         )
         row = "[data-parameter=image_rate_hz]"
-        await tab.wait_for(f"document.querySelector({row!r})")
+        await tab.wait_for(f"document.querySelector({row!r}) !== null")
         assert "largest rate" in await tab.value(f"document.querySelector({row + ' .about'!r}).textContent")
         assert await tab.value("document.querySelector('[data-parameter=port] input').disabled")
         said = f"document.querySelector({row + ' .said'!r}).textContent"
