@@ -216,9 +216,9 @@ class TargetTracking(TargetEstimator):
         return f"{track.reason}: {', '.join(distances_m)}" if len(distances_m) > 1 else track.reason
 
     def _observe_play(self, stamp_s: float, skew_s: float, seen_rad: Array) -> None:
-        """Learn the joints' play from a target at rest that eyes at rest have just seen at these angles (3,)."""
+        """Learn the joints' play from a target that eyes at rest have just seen at these angles (3,)."""
         first, last = sorted((stamp_s, stamp_s + skew_s))
-        if self.filter.moving or self._history.speed_within(first - _RESTED_S, last) > 0.0:
+        if self._history.speed_within(first - _RESTED_S, last) > 0.0:
             return
         at_left, at_right = self._history.shaft_at(stamp_s), self._history.shaft_at(last)
         axes_rad = np.array([at_left[0], at_right[1], at_left[2]])
