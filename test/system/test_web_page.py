@@ -1,13 +1,13 @@
 """The page in a real browser: a headless Chromium before the running simulated head."""
 
 import asyncio
-import time
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
 
+from vergence_bringup.page_address import page_address
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
@@ -50,14 +50,7 @@ class Head:
     def start_page(self, log: str, **parameters: object) -> str:
         """Start a web_node and return the first address that it prints."""
         self.pages.start(log, NodeCommand.of("web_node", {**self._shared, **parameters}))
-        end_s = time.monotonic() + STARTED_S
-        while time.monotonic() < end_s:
-            self.pages.check()
-            for line in (self._folder / "log" / f"{log}.log").read_text().splitlines():
-                if "the page: " in line:
-                    return line.partition("the page: ")[2].strip()
-            time.sleep(0.05)
-        raise AssertionError(f"web_node printed no address within {STARTED_S:g} s")
+        return page_address(self._folder / "log" / f"{log}.log", self.pages.check)
 
     def stop(self) -> None:
         for group in (self.pages, self.controllers, self.nodes):
