@@ -77,7 +77,7 @@ class Browser:
 def browser() -> Iterator[Browser]:
     path = find_chromium()
     if path is None:
-        pytest.skip("no Chromium is installed here (apt install chromium)")
+        pytest.skip("no Chromium is installed here")
     one = Browser(path)
     yield one
     one.close()

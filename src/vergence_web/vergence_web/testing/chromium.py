@@ -1,4 +1,4 @@
-"""A headless Chromium, driven by its DevTools protocol: pages are opened, clicked, read, and drawn as PNG."""
+"""A headless Chromium, driven by its DevTools protocol: pages are opened, clicked, read, and drawn as pictures."""
 
 import asyncio
 import base64
@@ -104,8 +104,9 @@ class Tab:
         await self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     async def screenshot(self, path: Path, whole: bool = False) -> None:
-        """Write what is seen, or the whole page, as PNG."""
-        answer = await self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+        """Write what is seen, or the whole page, as PNG, or as JPEG where the path ends so."""
+        jpeg = {"format": "jpeg", "quality": 85} if path.suffix == ".jpg" else {"format": "png"}
+        answer = await self.call("Page.captureScreenshot", captureBeyondViewport=whole, **jpeg)
         path.write_bytes(base64.b64decode(answer["data"]))
 
     async def close(self) -> None:

@@ -6,7 +6,7 @@ import { drawMarks } from "./marks.js";
 const LEAST_BOX_PX = 8;
 const HINTS = {
   side: "Click where both eyes are to look, or drag a box around a thing.",
-  anaglyph: "Left eye red, right eye cyan, foveas on each other: what is fixated has no coloured fringe. Clicks count as the left eye's.",
+  anaglyph: "Left eye red, right eye cyan, foveas on each other: what is fixated has its own colours and no fringe. Clicks count as the left eye's.",
   blend: "Both eyes half and half, foveas on each other: what is fixated is sharp. Clicks count as the left eye's.",
   edges: "As the metric sees it: edges of the left eye green, of the right one blue, of both white.",
 };
@@ -188,7 +188,7 @@ function blend(context, left, right, shift) {
 
 const scratch = document.createElement("canvas");
 
-/** Red of the left image's brightness, green and blue of the right one's. */
+/** The red of the left image, the green and the blue of the right one: what is fixated keeps its colours. */
 function anaglyph(context, left, right, shift) {
   const { width, height } = context.canvas;
   scratch.width = width;
@@ -206,9 +206,7 @@ function tinted(context, bitmap, shift, tint) {
   context.globalCompositeOperation = "source-over";
   context.fillStyle = "#000";
   context.fillRect(0, 0, width, height);
-  context.filter = "grayscale(1)";
   context.drawImage(bitmap, shift[0], shift[1]);
-  context.filter = "none";
   context.globalCompositeOperation = "multiply";
   context.fillStyle = tint;
   context.fillRect(0, 0, width, height);

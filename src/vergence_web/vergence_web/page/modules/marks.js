@@ -81,7 +81,7 @@ function drawTrack(context, track, side, at, scale) {
         context.lineTo(end, y + 4);
       }
     }, stroke, 1.5);
-    label(context, `σ ${track.sigma_px.toFixed(2)} px`, x + 10, y - 8);
+    label(context, `σ ${track.sigma_px.toFixed(2)} px`, x + 10, y + 20);
   }
 }
 
