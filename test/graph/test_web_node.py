@@ -170,6 +170,18 @@ def test_raw_images_are_encoded_where_no_jpegs_are(graph: Graph, page: Page) -> 
     assert page.state["slow"]["transports"] == {"left": "raw", "right": "raw"}
 
 
+def test_an_image_that_is_none_is_refused_in_words(graph: Graph, page: Page) -> None:
+    publishers = [graph.client.create_publisher(Image, f"{eye}/image_raw", IMAGE_QOS) for eye in ("left", "right")]
+
+    def refused() -> bool:
+        for publisher in publishers:
+            publisher.publish(Image(encoding="nonsense", height=1, width=1, step=3, data=b"123"))
+        return "encoding must be one of" in page.state.get("slow", {}).get("refused", "")
+
+    page.wait_until(refused, "the refusal")
+    assert page.images["left"] == []
+
+
 def test_the_edges_are_received_while_they_are_shown(graph: Graph, web: WebNode, page: Page) -> None:
     publisher = graph.client.create_publisher(Image, "vergence/overlay", IMAGE_QOS)
     page.send(do="show", edges=True)

@@ -286,6 +286,25 @@ def test_nothing_overlaps_at_any_size(head: Head, browser: Browser, width: int, 
     browser.run(visit)
 
 
+def test_a_finger_taps_and_draws_a_box(head: Head, browser: Browser) -> None:
+    async def visit(running: Chromium) -> None:
+        tab = await opened(running, head.url, *PHONE)
+        await tab.set_size(*PHONE, 2.0, True)
+        goal = "document.getElementById('goal').textContent"
+        marks = "figure[data-eye=right] .marks"
+        await tab.touch(marks, (0.5, 0.5))
+        await tab.wait_for(f"/^Look at pixel [0-9]+, [0-9]+ of the right eye: (?!sent)/.test({goal})")
+        await tab.click("#draw-box")
+        await tab.touch(marks, (0.3, 0.3), (0.5, 0.4), (0.7, 0.7))
+        await tab.wait_for(f"/^Look at what is in the box: (?!sent)/.test({goal})")
+        await tab.click("#stop")
+        await tab.wait_for(f"{goal} === 'Stop: stopped: the eyes hold still'")
+        assert tab.errors == []
+        await tab.close()
+
+    browser.run(visit)
+
+
 def test_a_page_for_other_machines_needs_its_token(head: Head, browser: Browser) -> None:
     url = head.start_page("web_node_for_all", port=0, address="0.0.0.0")
     port, token = url.partition("http://")[2].rpartition(":")[2].split("/?token=")

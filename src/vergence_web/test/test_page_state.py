@@ -77,6 +77,44 @@ def test_texts_from_outside_are_shortened() -> None:
     assert len(state(gaze=gaze_state(reason="x" * 10_000))["gaze"]["reason"]) == 300
 
 
+def test_the_metric_is_of_the_small_window_with_the_least_contrast() -> None:
+    edge = SimpleNamespace(
+        windows_px=[50, 100, 300],
+        left_to_right_px=[1.0, NAN, 3.0],
+        right_to_left_px=[1.5, 2.5, 3.5],
+        contrast=[0.9, 0.4, 0.1],
+        status=[0, 1, 0],
+        verged=True,
+    )
+    built = PageState(default_rig()).build({"vergence/edge": Newest(edge, 0.1)})["edge"]
+    assert built["best"] == 1
+    assert built["left_to_right_px"] == [1.0, None, 3.0]
+
+
+def test_a_metric_of_many_windows_is_bounded() -> None:
+    many = [1.0] * 5000
+    edge = SimpleNamespace(
+        windows_px=[50] * 5000, left_to_right_px=many, right_to_left_px=many, contrast=many, status=many, verged=False
+    )
+    built = PageState(default_rig()).build({"vergence/edge": Newest(edge, 0.1)})["edge"]
+    assert {len(values) for values in built.values() if isinstance(values, list)} == {20}
+
+
+def detection(left: float) -> Any:
+    return SimpleNamespace(class_name="cube", score=NAN, x_min_px=left, y_min_px=1.0, x_max_px=9.0, y_max_px=8.0)
+
+
+def test_boxes_carry_the_stamp_of_their_image() -> None:
+    stamp = SimpleNamespace(sec=1_795_825_253, nanosec=5)
+    message = SimpleNamespace(header=SimpleNamespace(stamp=stamp), left=[detection(2.04)], right=[])
+    built = PageState(default_rig()).build({"vergence/detections": Newest(message, 0.1)})["detections"]
+    assert built == {
+        "stamp": "1795825253000000005",
+        "left": [{"class": "cube", "score": None, "xyxy": [2.0, 1.0, 9.0, 8.0]}],
+        "right": [],
+    }
+
+
 def test_the_head_from_above_meets_where_the_axes_do() -> None:
     half = math.atan2(0.0325, 0.5)
     head = state(joints=joints(-half, half))["head"]

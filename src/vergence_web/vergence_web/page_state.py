@@ -21,7 +21,7 @@ STALE_S = 1.5
 """A message that is older is no longer shown as the present."""
 _CHI2_95_PERCENT_OF_TWO = 5.991
 _LONGEST_TEXT = 300
-_MOST_BOXES = 50
+_MOST_BOXES, _MOST_WINDOWS = 50, 20
 _DIGITS = 5
 
 
@@ -153,13 +153,14 @@ def _gaze(state: Any) -> dict[str, Any]:
 
 
 def _edge(edge: Any) -> dict[str, Any]:
+    windows, contrast = list(edge.windows_px)[:_MOST_WINDOWS], list(edge.contrast)[:_MOST_WINDOWS]
     return {
-        "windows_px": [int(size) for size in edge.windows_px],
-        "left_to_right_px": [figure(value, 3) for value in edge.left_to_right_px],
-        "right_to_left_px": [figure(value, 3) for value in edge.right_to_left_px],
-        "contrast": [figure(value, 3) for value in edge.contrast],
-        "status": [int(status) for status in edge.status],
-        "best": best_small_window(edge.windows_px, edge.contrast),
+        "windows_px": [int(size) for size in windows],
+        "left_to_right_px": [figure(value, 3) for value in edge.left_to_right_px[:_MOST_WINDOWS]],
+        "right_to_left_px": [figure(value, 3) for value in edge.right_to_left_px[:_MOST_WINDOWS]],
+        "contrast": [figure(value, 3) for value in contrast],
+        "status": [int(status) for status in edge.status[:_MOST_WINDOWS]],
+        "best": best_small_window(windows, contrast),
         "verged": bool(edge.verged),
     }
 

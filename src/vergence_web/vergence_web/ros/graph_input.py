@@ -19,7 +19,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 
-from vergence_common.images import ImageError, image_to_array
+from vergence_common.images import image_to_array
 from vergence_common.qos import IMAGE_QOS, STATE_QOS, QosWatch
 from vergence_msgs.msg import (
     BoxVergence,
@@ -185,7 +185,7 @@ class GraphInput:
         for eye, frame in frames.items():
             try:
                 data = self._jpeg(self._transports[eye], frame.message)
-            except ImageError as error:
+            except ValueError as error:
                 self._refused = f"{eye}: {error}"
                 continue
             parts[eye] = Part(data=data, about={"stamp": str(frame.stamp_ns)})
@@ -202,8 +202,11 @@ class GraphInput:
         if now_s - self._edges_s < _EDGES_PERIOD_S or not self._wanted():
             return
         self._edges_s = now_s
-        picture = image_to_array(deserialize_message(message, Image))
-        data = jpeg_of(picture, self._parameters().jpeg_quality)
+        try:
+            data = self._jpeg("raw", message)
+        except ValueError as error:
+            self._refused = f"edges: {error}"
+            return
         self._post({"edges": Part(data=data, about={"stamp": str(stamp_of(message))})})
 
     def _on_diagnostics(self, message: bytes) -> None:
@@ -218,6 +221,13 @@ class GraphInput:
         if not self._wanted():
             return
         self._send_images(self._pair.lone(now_s, _LONE_S))
+        try:
+            self._send_state(now_s)
+        except Exception as error:  # whatever is received must not end the node that only shows it
+            text = f"the state cannot be shown: {type(error).__name__}: {error}"
+            self._node.get_logger().error(text, throttle_duration_sec=10.0)
+
+    def _send_state(self, now_s: float) -> None:
         self._update_cameras()
         state = self._state.build(self._messages(now_s))
         windows = state["edge"]["windows_px"] if state["edge"] else []

@@ -100,6 +100,14 @@ class Tab:
         await self._mouse("mouseMoved", *await self.place_of(selector, *end))
         await self._mouse("mouseReleased", *await self.place_of(selector, *end))
 
+    async def touch(self, selector: str, *places: tuple[float, float]) -> None:
+        """Put a finger on the first of some places of an element, move it over the others, and lift it."""
+        for i, place in enumerate(places):
+            x, y = await self.place_of(selector, *place)
+            kind = "touchMove" if i else "touchStart"
+            await self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y}])
+        await self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
     async def _mouse(self, kind: str, x: float, y: float) -> None:
         await self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 

@@ -3,7 +3,8 @@
 import { find, fitted, setText } from "./dom.js";
 import { drawMarks } from "./marks.js";
 
-const LEAST_BOX_PX = 8;
+const LEAST_BOX_PX = 4;
+const LEAST_DRAG = 10; // CSS pixels: a finger moves a little while it taps
 const HINTS = {
   side: "Click where both eyes are to look, or drag a box around a thing.",
   anaglyph: "Left eye red, right eye cyan, foveas on each other: what is fixated has its own colours and no fringe. Clicks count as the left eye's.",
@@ -33,7 +34,8 @@ export class Eyes {
     this.figures[eye] = { figure, screen, marks, image: figure.querySelector(".image"), caption: figure.querySelector("figcaption") };
     marks.addEventListener("pointerdown", (event) => {
       if (event.button !== 0 || this.mode === "edges" || !this.images[eye]) return;
-      this.drag = { eye, stamp: this.images[eye].stamp, from: this.pixel(eye, event), to: this.pixel(eye, event) };
+      const at = this.pixel(eye, event);
+      this.drag = { eye, stamp: this.images[eye].stamp, from: at, to: at, begun: [event.clientX, event.clientY] };
       marks.setPointerCapture(event.pointerId);
     });
     marks.addEventListener("pointermove", (event) => {
@@ -44,8 +46,9 @@ export class Eyes {
     marks.addEventListener("pointerup", (event) => {
       if (!this.drag) return;
       const drag = { ...this.drag, to: this.pixel(this.drag.eye, event) };
+      const moved = Math.hypot(event.clientX - drag.begun[0], event.clientY - drag.begun[1]);
       this.drag = null;
-      this.onLook(lookRequest(drag), event.timeStamp);
+      this.onLook(lookRequest(drag, moved >= LEAST_DRAG), event.timeStamp);
     });
     marks.addEventListener("pointercancel", () => { this.drag = null; });
   }
@@ -166,11 +169,11 @@ export class Eyes {
   }
 }
 
-function lookRequest({ eye, stamp, from, to }) {
-  const size = [Math.abs(to[0] - from[0]), Math.abs(to[1] - from[1])];
+/** A box about what was dragged over, or the pixel that was clicked. */
+function lookRequest({ eye, stamp, from, to }, isBox) {
   const request = { do: "pixel", eye, stamp };
-  if (Math.max(...size) < LEAST_BOX_PX) return { ...request, x: to[0], y: to[1] };
-  const [width, height] = size.map((side) => Math.max(side, LEAST_BOX_PX));
+  if (!isBox) return { ...request, x: from[0], y: from[1] };
+  const [width, height] = [0, 1].map((i) => Math.max(Math.abs(to[i] - from[i]), LEAST_BOX_PX));
   return { ...request, x: (from[0] + to[0]) / 2, y: (from[1] + to[1]) / 2, width, height };
 }
 
