@@ -87,6 +87,12 @@ _FRAMES = LaunchArgument(
     "auto",
     ("auto", "true", "false"),
 )
+_WEB = (
+    _switch("web", "run web_node, the page of the head for browsers, at http://localhost:8470", "false"),
+    LaunchArgument(
+        "web_address", "address that the page listens on; 0.0.0.0 for other machines, which need its token", "127.0.0.1"
+    ),
+)
 _RANGE = LaunchArgument(
     "discovery_range",
     "how far nodes are discovered; the other machine must be in it",
@@ -111,6 +117,7 @@ _CAMERAS_AND_VISION = (
     ),
     _ENCODER,
     _FRAMES,
+    *_WEB,
     _PROFILE,
 )
 
@@ -131,6 +138,7 @@ ARGUMENTS: dict[str, tuple[LaunchArgument, ...]] = {
         ),
         _ENCODER,
         _FRAMES,
+        *_WEB,
         _switch(
             "use_sim_time",
             "simulated time: sim_node publishes /clock, which waits for the nodes that follow it",

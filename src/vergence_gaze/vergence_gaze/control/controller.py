@@ -139,7 +139,7 @@ class GazeController:
             else:
                 tracking.request_target(*start)
                 xy = goal.left_xy if goal.left_eye else goal.right_xy
-                self._requests.ask(TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy))
+                self._requests.ask(TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy, goal.extent_rad))
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
 
