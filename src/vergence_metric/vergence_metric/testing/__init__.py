@@ -1,0 +1,1 @@
+"""Detectors with known answers, for tests and benchmarks."""
