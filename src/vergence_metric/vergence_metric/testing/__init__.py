@@ -1,0 +1,1 @@
+"""Test doubles: a head without hardware for tests and benchmarks."""
