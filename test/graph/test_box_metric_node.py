@@ -18,7 +18,7 @@ from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_metric.boxes import DetectorError
 from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.ros.box_metric_node import BoxMetricNode
-from vergence_msgs.msg import BoxVergence, DetectorClasses, StereoDetections
+from vergence_msgs.msg import BoxVergence, DetectorClasses, ObjectRequest, StereoDetections
 from vergence_rig.parameters import RenamedParameterError
 from vergence_rig.rig import default_rig
 
@@ -131,7 +131,7 @@ def answer(graph: Any, node: BoxMetricNode, eyes: Eyes, left: Any, right: Any) -
 def test_the_classes_are_published_to_whoever_comes_later(graph: Any, node: BoxMetricNode) -> None:
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     future = graph.message(DetectorClasses, "vergence/detector_classes", qos=latched)
-    assert graph.wait(future).names == ["square"]
+    assert graph.wait(future).names == ["square", "motion"]
 
 
 def test_a_pair_gives_metric_ii_with_the_left_stamp(graph: Any, node: BoxMetricNode) -> None:
@@ -177,6 +177,39 @@ def test_one_eye_blind_is_said_and_not_zero(graph: Any, node: BoxMetricNode) -> 
     assert math.isnan(message.sigma_px)
     assert math.isnan(message.right.x_min_px)
     assert message.left.x_min_px == 63.5
+
+
+def test_two_that_cross_keep_their_ids_and_the_requested_one_is_the_target(graph: Any, node: BoxMetricNode) -> None:
+    eyes = Eyes(graph)
+    graph.set_parameters(node, **{"motion.enable": False})
+
+    def both(first: int, second: int) -> BoxVergence:
+        """A darker square in the upper row and a brighter one below, which move past one another."""
+        views = [np.zeros((HEIGHT, WIDTH, 3), np.uint8) for _ in range(2)]
+        for view, shift in zip(views, (0, CELL), strict=True):
+            view[CELL : 2 * CELL, first - shift : first - shift + CELL, 2] = 200
+            view[3 * CELL : 4 * CELL, second - shift : second - shift + CELL, 2] = 255
+        return answer(graph, node, eyes, *views)
+
+    message = both(32, 80)
+    rows = {one.object_id: one for one in message.objects}
+    assert len(rows) == 2
+    target = message.object_id
+    (other,) = set(rows) - {target}
+    assert "of 2 objects" in message.choice_reason
+    for first in (48, 64, 80):
+        message = both(first, 112 - first)
+        assert message.object_id == target
+        assert {one.object_id for one in message.objects} == {target, other}
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    requests = graph.client.create_publisher(ObjectRequest, "vergence/object_request", latched)
+    requests.publish(ObjectRequest(class_name="square", object_id=other))
+    graph.wait_until(lambda: node._measurement._choice._requested.object_id == other, "the request has arrived")
+    before_px = message.left.y_min_px
+    message = both(80, 32)
+    assert message.object_id == other
+    assert message.left.y_min_px != before_px
+    assert message.choice_reason == f"object {other} is requested"
 
 
 def test_detections_and_picture_are_published_while_subscribed(graph: Any, node: BoxMetricNode) -> None:

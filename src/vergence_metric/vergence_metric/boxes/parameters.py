@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from vergence_metric.boxes.follow_parameters import FollowParameters, MotionParameters
 from vergence_metric.boxes.layouts import AUTO, layout_names
 from vergence_metric.boxes.letterbox import RESIZES
 from vergence_metric.boxes.preprocessing import COLORS, SCALES
@@ -176,29 +177,6 @@ class AssociationParameters(Parameters):
 
 
 @dataclass(frozen=True)
-class FollowParameters(Parameters):
-    """How the target is recognised from one pair of images to the next."""
-
-    gate_px: float = parameter(
-        60.0,
-        "largest distance from the target's expected place at which an object still counts as the target",
-        unit="px",
-        minimum=1.0,
-        maximum=1000.0,
-        formerly="follow_gate_px",
-    )
-    forget_after_s: float = parameter(
-        1.0,
-        "a target that is not seen for this long is given up, and the best object near the image's middle becomes the "
-        "target",
-        unit="s",
-        minimum=0.0,
-        maximum=60.0,
-        formerly="forget_s",
-    )
-
-
-@dataclass(frozen=True)
 class BoxMeasurementParameters(Parameters):
     """How the target's pair of boxes is measured."""
 
@@ -231,6 +209,7 @@ class BoxMetricParameters:
     detector: DetectorParameters = field(default_factory=DetectorParameters)
     association: AssociationParameters = field(default_factory=AssociationParameters)
     follow: FollowParameters = field(default_factory=FollowParameters)
+    motion: MotionParameters = field(default_factory=MotionParameters)
     measurement: BoxMeasurementParameters = field(default_factory=BoxMeasurementParameters)
 
 
@@ -261,5 +240,6 @@ GROUPS: Groups = (
     ("detector.", DetectorParameters),
     ("association.", AssociationParameters),
     ("follow.", FollowParameters),
+    ("motion.", MotionParameters),
     ("measurement.", BoxMeasurementParameters),
 )

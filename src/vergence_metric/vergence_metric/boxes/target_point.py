@@ -51,7 +51,7 @@ def locate(
         moved = EyeAngles(eyes.pan_left_rad + offsets[3], eyes.pan_right_rad + offsets[4], eyes.tilt_rad + offsets[5])
         left = (left_px[0] + offsets[0], left_px[1] + offsets[1])
         right = (right_px[0] + offsets[0] - offsets[2], right_px[1] + offsets[1])
-        return _meeting(left, right, cameras, moved, kinematics)
+        return meeting(left, right, cameras, moved, kinematics)
 
     try:
         center = point(np.zeros(6))
@@ -66,18 +66,22 @@ def locate(
     return TargetPoint(center, np.asarray(spread @ spread.T))
 
 
-def _meeting(
+def meeting(
     left_px: tuple[float, float],
     right_px: tuple[float, float],
     cameras: tuple[CameraModel, CameraModel],
     eyes: EyeAngles,
     kinematics: Kinematics,
 ) -> Array:
-    meeting = []
+    """Return the point (3,) in rig_base [m] between the rays of a left and a right pixel, where they come closest.
+
+    Raises GeometryError where they do not meet in front.
+    """
+    rays = []
     for left, camera, pan, pixel in zip(
         (True, False), cameras, (eyes.pan_left_rad, eyes.pan_right_rad), (left_px, right_px), strict=True
     ):
         turn = kinematics.rotation_rig_from_optical(pan, eyes.tilt_rad)
-        meeting += [kinematics.lens(left, pan, eyes.tilt_rad), turn @ camera.pixel_to_ray([pixel])[0]]
-    a, b = nearest_points_of_rays(*meeting)
+        rays += [kinematics.lens(left, pan, eyes.tilt_rad), turn @ camera.pixel_to_ray([pixel])[0]]
+    a, b = nearest_points_of_rays(*rays)
     return np.asarray(0.5 * (a + b))

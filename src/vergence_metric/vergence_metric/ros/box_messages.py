@@ -10,8 +10,10 @@ from std_msgs.msg import Header
 
 from vergence_metric.boxes.detections import Box, Detections
 from vergence_metric.boxes.result import BoxVergenceResult
+from vergence_metric.boxes.seen_object import SeenObject
+from vergence_metric.boxes.target_choice import RequestedObject
 from vergence_metric.boxes.target_point import TargetPoint
-from vergence_msgs.msg import BoundingBox, BoxVergence, StereoDetections
+from vergence_msgs.msg import BoundingBox, BoxVergence, DetectedObject, ObjectRequest, StereoDetections
 from vergence_rig.eye_image import EyeImage
 
 POINT_FRAME = "rig_base"
@@ -38,8 +40,28 @@ def box_message(box: Box | None) -> BoundingBox:
     )
 
 
-def box_vergence_message(result: BoxVergenceResult, header: Header, pair_skew_s: float) -> BoxVergence:
-    """Return metric II of a pair; `header` is the left image's."""
+def object_message(one: SeenObject, focal_px: float) -> DetectedObject:
+    """Return an object in view; `focal_px` is the left camera's, NaN if unknown."""
+    return DetectedObject(
+        object_id=one.object_id,
+        class_name=one.class_name,
+        score=one.boxes.score,
+        version_rad=one.version_rad,
+        tilt_rad=one.tilt_rad,
+        distance_m=one.distance_m,
+        size_rad=one.size_px / focal_px,
+    )
+
+
+def requested_object(message: ObjectRequest) -> RequestedObject:
+    """Return what is to be the target."""
+    return RequestedObject(message.class_name, message.object_id)
+
+
+def box_vergence_message(
+    result: BoxVergenceResult, header: Header, pair_skew_s: float, focal_px: float = math.nan
+) -> BoxVergence:
+    """Return metric II of a pair; `header` is the left image's, `focal_px` the left camera's, NaN if unknown."""
     there, back = (
         [float(value) for value in values]
         for values in (result.corners.left_minus_right_px, result.corners.right_minus_left_px)
@@ -72,6 +94,9 @@ def box_vergence_message(result: BoxVergenceResult, header: Header, pair_skew_s:
         right_azimuth_rad=result.right_rad[0],
         right_elevation_rad=result.right_rad[1],
         class_name=result.class_name,
+        object_id=result.object_id,
+        choice_reason=result.choice_reason,
+        objects=[object_message(one, focal_px) for one in result.objects],
         status=int(result.status),
         reason=result.reason,
     )

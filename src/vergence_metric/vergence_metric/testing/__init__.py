@@ -1,1 +1,1 @@
-"""Detectors with known answers, for tests and benchmarks."""
+"""Test doubles: detectors and scenes with known answers, for tests and benchmarks."""
