@@ -39,8 +39,8 @@ def test_directions_and_place_are_of_the_point_between_the_eyes(onnx_model):
     path = str(onnx_model("yunet"))
     measurement = BoxMeasurement(BoxMetricParameters(DetectorParameters(model=path)), HEAD)
     k = [100.0, 0, 63.5, 0, 100.0, 47.5, 0, 0, 1]
-    cameras = tuple(CameraModel.from_camera_info_values(128, 96, k, []) for _ in range(2))
-    result = measurement.measure(scene(64), scene(48), 0.0, EyeAngles(0.0, 0.0, 0.0), cameras)
+    camera = CameraModel.from_camera_info_values(128, 96, k, [])
+    result = measurement.measure(scene(64), scene(48), 0.0, EyeAngles(0.0, 0.0, 0.0), (camera, camera))
     assert result.class_name == "face"
     # The built face has its eyes a fifth of a cell below the cell's top, its box's middle in the cell's.
     expected = math.atan((15.5 + 0.2 * 16 - 47.5) / 100)
