@@ -266,7 +266,7 @@ def test_a_class_that_the_detector_does_not_look_for_is_refused_at_once(scene: S
 
 def test_a_face_that_nothing_detects_ends_with_what_is_missing(scene: Scene) -> None:
     result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="face", time_limit_s=0.5)))
-    assert result.result == LookAt.Result.TIMED_OUT
+    assert result.result in (LookAt.Result.TIMED_OUT, LookAt.Result.LOST)
     assert "box_metric_node must run; faces need YuNet" in result.reason
 
 
