@@ -7,7 +7,7 @@ from vergence_metric.testing.face_panels import FacePicture
 
 _ASTRONAUT = (slice(20, 220), slice(130, 320))
 _ASTRONAUT_BOX = (178.5, 63.0, 269.5, 173.5)
-_ASTRONAUT_LANDMARKS = ((201.5, 104.5), (245.0, 104.5), (220.5, 126.5), (203.5, 144.5), (241.5, 144.5))
+_ASTRONAUT_LANDMARKS = ((203.2, 101.0), (246.3, 103.2), (222.0, 127.0), (202.0, 140.0), (245.0, 140.0))
 _SMALL_SCALE = 6
 _SMALL_LANDMARKS = ((8.0, 8.5), (16.0, 8.5), (12.0, 13.0), (8.7, 17.5), (15.3, 17.5))
 _SMALL_FACES = 100
