@@ -19,7 +19,7 @@ _SIZES_PX = tuple(16.0 * 1.2**i for i in range(9))  # between the eyes, as they 
 _CELL_PX = 8  # of the cells that answer: YuNet's finest
 _STEP_PX = 2  # of the map in which the best place is looked for
 _PER_CELL = _CELL_PX // _STEP_PX
-_LEAST, _SURE = 0.6, 0.85  # correlations with a score of 0 and of 1
+_LEAST, _SURE = 0.5, 1.0  # correlations with a score of 0 and of 1
 _FLOOR = 1e-4  # of the variance: where nothing is to be seen, nothing correlates
 
 

@@ -40,9 +40,11 @@ def find_layout(warm_up: WarmUp, wanted: str = AUTO) -> Layout:
         raise ModelLayoutError(f"the model's outputs must have the layout {wanted!r}: got {shapes}")
     width, height = warm_up.input_px
     if not fitting:
+        maps = all(output.ndim in (4, 5) for output in warm_up.outputs)
+        hint = ", maps before decoding: export it with its detection head (YOLOv7: --grid)" if maps else ""
         raise ModelLayoutError(
             f"the model's outputs must have one of the detector layouts {', '.join(layout_names())}: got {shapes} "
-            f"for an input of {width}x{height} px"
+            f"for an input of {width}x{height} px{hint}"
         )
     against = {layout: layout.contradiction(warm_up) for layout in (_checked(one, warm_up) for one in fitting)}
     agreeing = [layout for layout, reason in against.items() if not reason]
