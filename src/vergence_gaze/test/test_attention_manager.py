@@ -59,7 +59,7 @@ def looked_at(room):
 
 def test_the_most_interesting_class_in_view_is_looked_at():
     room = Room()
-    assert room.see((1, "cube"), (2, "face"), (3, "chair")).class_name == "face"
+    assert room.see((1, "cube"), (2, "face"), (3, "chair"), for_s=0.5).class_name == "face"
     assert room.manager.describe() == "social: the most interesting class in view is face"
 
 
@@ -69,9 +69,15 @@ def test_what_is_in_no_list_is_never_looked_at():
     assert "scanning the room" in room.manager.describe()
 
 
+def test_what_is_seen_for_a_moment_only_is_not_looked_at():
+    room = Room()
+    assert room.see((1, "face"), for_s=0.2) is None
+    assert room.see(for_s=2.0) is None
+
+
 def test_a_more_interesting_class_takes_over_after_the_least_dwell():
     room = Room()
-    room.see((1, "cube"), for_s=0.3)
+    room.see((1, "cube"), for_s=0.6)
     assert room.see((1, "cube"), (2, "face"), for_s=0.4).class_name == "cube"
     assert room.see((1, "cube"), (2, "face"), for_s=P.min_dwell_s).class_name == "face"
     assert room.see((1, "cube"), (2, "face"), for_s=3.0).class_name == "face"
@@ -88,7 +94,7 @@ def test_what_is_gone_is_given_up_after_a_time_for_the_next_or_for_nothing():
 
 def test_a_glance_and_back_to_the_same_one():
     room = Room()
-    room.see((1, "face"), (2, "face"), for_s=P.glance_every_s + 0.3)
+    room.see((1, "face"), (2, "face"), for_s=P.glance_every_s + 0.7)
     assert looked_at(room) == [("face", 0), ("face", 2)]
     room.see((1, "face"), (2, "face"), for_s=P.glance_s + 0.2)
     assert looked_at(room)[2:] == [("face", 1)]
@@ -107,11 +113,11 @@ def test_glances_go_to_each_in_turn():
 
 def test_a_glance_at_what_goes_away_ends_at_once_and_one_that_never_arrives_ends_too():
     room = Room()
-    room.see((1, "face"), (2, "face"), for_s=P.glance_every_s + 0.3)
+    room.see((1, "face"), (2, "face"), for_s=P.glance_every_s + 0.7)
     room.see((1, "face"), for_s=P.gone_after_s + 0.2)
     assert looked_at(room)[-1] == ("face", 1)
     room = Room()
-    room.see((1, "face"), (2, "face"), for_s=P.glance_every_s + 0.3)
+    room.see((1, "face"), (2, "face"), for_s=P.glance_every_s + 0.7)
     room.see((1, "face"), (2, "face"), for_s=3.0, verged=False)
     assert looked_at(room)[-2:] == [("face", 1), ("face", 0)]
 

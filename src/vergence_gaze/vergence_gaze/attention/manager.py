@@ -19,6 +19,7 @@ from vergence_gaze.attention_parameters import FOCUSED, RANDOM, SOCIAL, Attentio
 from vergence_gaze.estimation.observations import BoxSighting
 
 _ARRIVAL_S = 1.5  # a glance that has not arrived by then ends all the same
+_STEADY_S = 0.25  # an object that has been seen for less may be a detector's mistake
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,15 @@ class _Glance:
     home_id: int
     since_s: float
     until_s: float = math.inf
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """An object in view: its class, and when it was seen first and last."""
+
+    class_name: str
+    first_s: float
+    last_s: float
 
 
 class AttentionManager:
@@ -70,7 +80,7 @@ class AttentionManager:
         self.focus: Focus | None = None
         """What is looked at; None while nothing is."""
         self._since_s, self._target_id = -math.inf, 0
-        self._seen: dict[int, tuple[str, float]] = {}
+        self._seen: dict[int, _Seen] = {}
         self._looked_s: dict[int, float] = {}
         self._glance: _Glance | None = None
 
@@ -81,13 +91,14 @@ class AttentionManager:
     def observe(self, box: BoxSighting, now_s: float) -> None:
         """Keep which objects are in view, and which one the detector has chosen."""
         for one in box.objects:
-            self._seen[one.object_id] = one.class_name, now_s
+            before = self._seen.get(one.object_id)
+            self._seen[one.object_id] = _Seen(one.class_name, now_s if before is None else before.first_s, now_s)
         self._target_id = box.object_id
 
     def update(self, now_s: float, verged: bool) -> bool:
         """Update the focus; returns whether it has changed. `verged` says whether the eyes are verged on it."""
         before = self.focus
-        self._seen = {i: seen for i, seen in self._seen.items() if now_s - seen[1] <= self._p.gone_after_s}
+        self._seen = {i: seen for i, seen in self._seen.items() if now_s - seen.last_s <= self._p.gone_after_s}
         self._looked_s = {i: looked_s for i, looked_s in self._looked_s.items() if i in self._seen}
         if self._policy not in (SOCIAL, FOCUSED):
             self._glance, self.focus = None, None
@@ -100,9 +111,7 @@ class AttentionManager:
         return self.focus != before
 
     def _attend(self, now_s: float, verged: bool) -> None:
-        best = min(
-            (seen[0] for seen in self._seen.values() if seen[0] in self._p.classes), key=self._rank, default=None
-        )
+        best = min(self._of_interest().values(), key=self._rank, default=None)
         focus = self.focus
         if focus is None or not self._is_in_view(focus):
             self.focus = None if best is None else Focus(best, reason=f"the most interesting class in view is {best}")
@@ -122,14 +131,14 @@ class AttentionManager:
             self._begin_glance(focus, now_s)
 
     def _begin_glance(self, focus: Focus, now_s: float) -> None:
-        others = [i for i, seen in self._seen.items() if i != self._target_id and seen[0] in self._p.classes]
+        others = {i: name for i, name in self._of_interest().items() if i != self._target_id}
         if not others or self._target_id not in self._seen:
             return
         # The one that was looked at the longest time ago, and of those never looked at the more interesting.
-        other = min(others, key=lambda i: (self._looked_s.get(i, -math.inf), self._rank(self._seen[i][0])))
+        other = min(others, key=lambda i: (self._looked_s.get(i, -math.inf), self._rank(others[i])))
         self._glance = _Glance(focus.class_name, self._target_id, now_s)
         self._looked_s[other] = now_s
-        name = self._seen[other][0]
+        name = others[other]
         self.focus = Focus(name, other, f"a glance at object {other} ({name})")
 
     def _glancing(self, glance: _Glance, now_s: float, verged: bool) -> None:
@@ -146,7 +155,12 @@ class AttentionManager:
     def _is_in_view(self, focus: Focus) -> bool:
         if focus.object_id:
             return focus.object_id in self._seen
-        return any(name == focus.class_name for name, _ in self._seen.values())
+        return any(seen.class_name == focus.class_name for seen in self._seen.values())
+
+    def _of_interest(self) -> dict[int, str]:
+        """Return the classes of the objects that may be looked at, by id."""
+        steady = ((i, seen) for i, seen in self._seen.items() if seen.last_s - seen.first_s >= _STEADY_S)
+        return {i: seen.class_name for i, seen in steady if seen.class_name in self._p.classes}
 
     def _rank(self, class_name: str) -> int:
         return self._p.classes.index(class_name)
