@@ -25,6 +25,9 @@ _GATE_SIGMAS = 3.0
 _MOST_SQUARED = 9.0  # of place, depth and size each
 _MAX_COST = 16.0  # of all together: above, the object is another one
 
+_TENTATIVE_PAIRS = 5  # an object seen in fewer may be a mistake of detection or pairing:
+_TENTATIVE_COST = 4.0  # others are likelier to be what is seen
+
 _RATE_HOLD_S = 0.6  # time in which the speed of an object out of sight fades
 _RATE_GAIN = 0.35
 _LARGEST_GATE_GROWTH = 1.0
@@ -64,7 +67,7 @@ class _ObjectTrack:
     def __init__(self, object_id: int, class_id: int) -> None:
         self.object_id, self.class_id = object_id, class_id
         self.eyes: list[_EyeTrack | None] = [None, None]
-        self.seen_s = -math.inf
+        self.seen_s, self.pairs = -math.inf, 0
         self.parallax_rad = self.log_size = self.nearness_per_m = math.nan
         self.looks: Descriptor | None = None
 
@@ -102,16 +105,18 @@ class _ObjectTrack:
                 self.eyes[eye] = _EyeTrack(place, stamp_s)
             else:
                 track.update(place, stamp_s)
-        self.seen_s = stamp_s
+        self.seen_s, self.pairs = stamp_s, self.pairs + 1
         self.parallax_rad = _averaged(self.parallax_rad, seen.parallax_rad, _PARALLAX_GAIN)
         self.log_size = _averaged(self.log_size, seen.log_size, _SIZE_GAIN)
         if seen.point_m is not None:
             nearness = 1.0 / float(np.linalg.norm(seen.point_m))
             self.nearness_per_m = _averaged(self.nearness_per_m, nearness, _PARALLAX_GAIN)
         correlation = descriptor_correlation(self.looks, seen.looks)
-        if correlation is None:
-            self.looks = seen.looks if self.looks is None else self.looks
-        elif correlation > _SAME_LOOKS and not seen.hidden and self.looks is not None and seen.looks is not None:
+        if seen.hidden:
+            return
+        if self.looks is None:
+            self.looks = seen.looks
+        elif correlation is not None and correlation > _SAME_LOOKS and seen.looks is not None:
             mixed = (1.0 - _LOOKS_GAIN) * self.looks + _LOOKS_GAIN * seen.looks
             self.looks = np.asarray(mixed / np.linalg.norm(mixed), np.float32)
 
@@ -193,9 +198,12 @@ class ObjectTracks:
         gate_px = self.parameters.gate_px * (1.0 + min(stamp_s - track.seen_s, _LARGEST_GATE_GROWTH))
         correlation = descriptor_correlation(track.looks, seen.looks)
         recognised = correlation is not None and correlation > _SURE_LOOKS
-        if not off_px or np.mean(off_px) > gate_px * (_FAR_GATE if recognised else 1.0):
+        # Of boxes that are no pair one may be in its place all the same: then its depth is wrong.
+        least_px = min(off_px, default=math.inf)
+        if least_px > gate_px * (_FAR_GATE if recognised else 1.0):
             return math.inf
-        cost = _squared(float(np.mean(off_px)), gate_px / _GATE_SIGMAS)
+        cost = _TENTATIVE_COST if track.pairs < _TENTATIVE_PAIRS else 0.0
+        cost += _squared(least_px, gate_px / _GATE_SIGMAS)
         cost += _squared(track.parallax_rad - seen.parallax_rad, _PARALLAX_SIGMA_RAD)
         cost += _squared(track.log_size - seen.log_size, _SIZE_SIGMA)
         if correlation is not None:
