@@ -41,12 +41,13 @@ class Run:
         visible: Callable[[float], bool] = lambda time_s: True,
         class_name: str = "face",
         start_rad: Mapping[str, float] = MappingProxyType({"pan_right": 0.05}),
+        vision: VisionModel = SEEING,
     ) -> None:
         rig = default_rig().with_servos(servo)
         self.p = gaze_parameters({**ATTEND, **parameters})
         path = target if callable(target) else lambda time_s: np.asarray(target)
         self.head = FakeHead(
-            rig, path, SEEING, 3, start_rad, visible, class_name=class_name, others=others
+            rig, path, vision, 3, start_rad, visible, class_name=class_name, others=others
         )  # fmt: skip
         self.controller = GazeController(rig, self.p)
         self.times_s: list[float] = []
@@ -110,6 +111,13 @@ def test_with_nothing_to_see_the_room_is_scanned_slowly() -> None:
     assert tilts.min() < -0.4
     assert tilts.max() > 0.4
     assert np.abs(run.rates_rad_s()).max() <= run.p.attention.scan_speed_rad_s * 1.001
+
+
+def test_without_a_detector_the_eyes_hold_still() -> None:
+    run = Run(vision=VisionModel(boxes=False))
+    report = run.until(8.0)
+    assert report.attention == "social: no results of a detector arrive (vergence/box)"
+    assert np.ptp(np.array(run.commands), axis=0).max() < 0.01
 
 
 def test_switches_are_smooth_and_rates_bounded() -> None:

@@ -67,8 +67,11 @@ class Attending:
 
     @property
     def may_search(self) -> bool:
-        """Whether the eyes may go anywhere else: not while they turn to an object, or wait for it to be seen again."""
-        return self._manager.focus is None
+        """Whether the eyes may go anywhere: not while they turn to an object, or wait for it to be seen again.
+
+        Without results of a detector there is nothing to be found.
+        """
+        return self._manager.policy == RANDOM or (self._manager.focus is None and not self._manager.blind)
 
     def set_policy(self, policy: str) -> None:
         """Use another policy from now on; it also ends a pause."""

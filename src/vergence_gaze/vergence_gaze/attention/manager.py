@@ -19,6 +19,7 @@ from vergence_gaze.attention_parameters import FOCUSED, RANDOM, SOCIAL, Attentio
 from vergence_gaze.estimation.observations import BoxSighting
 
 _ARRIVAL_S = 1.5  # a glance that has not arrived by then ends all the same
+_BLIND_S = 2.0  # without results of a detector, after which there is nothing to scan for
 _STEADY_S = 0.25  # an object that has been seen for less may be a detector's mistake
 
 
@@ -79,6 +80,8 @@ class AttentionManager:
         """Forget what was seen and looked at."""
         self.focus: Focus | None = None
         """What is looked at; None while nothing is."""
+        self.blind, self._observed_s = True, -math.inf
+        """Whether no results of a detector arrive: nothing can be found then."""
         self._since_s, self._target_id = -math.inf, 0
         self._seen: dict[int, _Seen] = {}
         self._looked_s: dict[int, float] = {}
@@ -90,6 +93,7 @@ class AttentionManager:
 
     def observe(self, box: BoxSighting, now_s: float) -> None:
         """Keep which objects are in view, and which one the detector has chosen."""
+        self._observed_s = now_s
         for one in box.objects:
             before = self._seen.get(one.object_id)
             self._seen[one.object_id] = _Seen(one.class_name, now_s if before is None else before.first_s, now_s)
@@ -97,7 +101,7 @@ class AttentionManager:
 
     def update(self, now_s: float, verged: bool) -> bool:
         """Update the focus; returns whether it has changed. `verged` says whether the eyes are verged on it."""
-        before = self.focus
+        before, self.blind = self.focus, now_s - self._observed_s > _BLIND_S
         self._seen = {i: seen for i, seen in self._seen.items() if now_s - seen.last_s <= self._p.gone_after_s}
         self._looked_s = {i: looked_s for i, looked_s in self._looked_s.items() if i in self._seen}
         if self._policy not in (SOCIAL, FOCUSED):
@@ -171,6 +175,8 @@ class AttentionManager:
             return f"{self._policy}: looking anywhere"
         if self._policy not in (SOCIAL, FOCUSED):
             return self._policy
+        if self.blind:
+            return f"{self._policy}: no results of a detector arrive (vergence/box)"
         if self.focus is None:
             return f"{self._policy}: nothing of interest in view, scanning the room"
         return f"{self._policy}: {self.focus.reason}"
