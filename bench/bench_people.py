@@ -1,8 +1,8 @@
-"""Persons: detectors' layouts, whose face is whose, and how well a gaze rests between the eyes."""
+"""Persons: detectors' layouts, whose face is whose, which person is chosen, where a gaze rests, how they are found."""
 
 from collections.abc import Callable
 
-from bench import people_layouts, people_pairs, people_point
+from bench import people_attention, people_choice, people_layouts, people_pairs, people_point
 from bench.results import Row, table
 
 __all__ = ["run", "table"]
@@ -13,5 +13,7 @@ def run(say: Callable[[str], None]) -> list[Row]:
     return [
         *people_layouts.rows(say),
         *people_pairs.rows(say),
+        *people_choice.rows(say),
         *people_point.rows(say),
+        *people_attention.rows(say),
     ]

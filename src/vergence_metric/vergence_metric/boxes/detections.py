@@ -121,3 +121,10 @@ def cut_sides(xyxy_px: NDArray[np.float64], image_size_px: tuple[int, int]) -> N
     return np.column_stack(
         [xyxy_px[:, 0] <= low, xyxy_px[:, 1] <= low, xyxy_px[:, 2] >= high[0], xyxy_px[:, 3] >= high[1]]
     )
+
+
+def covered_share(one: Box, other: Box) -> float:
+    """Return the share of a box that another one covers."""
+    a, b = one.xyxy_px, other.xyxy_px
+    width, height = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+    return max(width, 0.0) * max(height, 0.0) / max(one.size_px[0] * one.size_px[1], 1e-9)

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_metric.boxes.detections import Box, cut_sides
+from vergence_metric.boxes.detections import Box, covered_share, cut_sides
 from vergence_metric.boxes.follow_parameters import MotionParameters
 from vergence_metric.edges.edges import to_grey
 
@@ -88,10 +88,4 @@ class MotionDetector:
 
 def outside_of(moving: list[Box], detected: list[Box]) -> list[Box]:
     """Return the moving regions that do not lie mostly in a detected box."""
-    return [one for one in moving if not any(_share_inside(one, box) > _INSIDE_SHARE for box in detected)]
-
-
-def _share_inside(one: Box, other: Box) -> float:
-    a, b = one.xyxy_px, other.xyxy_px
-    width, height = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
-    return max(width, 0.0) * max(height, 0.0) / max(one.size_px[0] * one.size_px[1], 1e-9)
+    return [one for one in moving if not any(covered_share(one, box) > _INSIDE_SHARE for box in detected)]

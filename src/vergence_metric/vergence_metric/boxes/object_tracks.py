@@ -12,23 +12,29 @@ from vergence_metric.boxes.association import Association, Expected
 from vergence_metric.boxes.follow_parameters import FollowParameters
 from vergence_metric.boxes.pair_geometry import PairGeometry
 from vergence_metric.boxes.patch_descriptor import Descriptor, descriptor_correlation
-from vergence_metric.boxes.seen_object import ObjectMeasures, SeenObject, measured, objects_of
+from vergence_metric.boxes.seen_object import ObjectBoxes, ObjectMeasures, SeenObject, measured, objects_of
 
 Array = NDArray[np.float64]
 
 # Standard deviations of the differences between what is expected of an object and what is seen of it.
 _PARALLAX_SIGMA_RAD = 0.012  # two joints without feedback, and the boxes of both eyes
 _SIZE_SIGMA = 0.25  # of the logarithm of the box's size: another object may hide a part
-_LOOKS_SIGMA = 0.35  # of the descriptors' correlation from 1
+_LOOKS_SIGMA = 0.22  # of the descriptors' correlation from 1
+_HIDDEN_LOOKS_SIGMA = 0.5  # of that of an object that another one hides in part
 _GATE_SIGMAS = 3.0
-_MOST_SQUARED = 9.0
-_MAX_COST = 20.0  # of place, depth, size and looks together, each at most _MOST_SQUARED
+_MOST_SQUARED = 9.0  # of place, depth and size each
+_MAX_COST = 16.0  # of all together: above, the object is another one
+
+_TENTATIVE_PAIRS = 5  # an object seen in fewer may be a mistake of detection or pairing:
+_TENTATIVE_COST = 4.0  # others are likelier to be what is seen
 
 _RATE_HOLD_S = 0.6  # time in which the speed of an object out of sight fades
 _RATE_GAIN = 0.35
 _LARGEST_GATE_GROWTH = 1.0
 _SIZE_GAIN, _PARALLAX_GAIN, _LOOKS_GAIN = 0.3, 0.3, 0.2
-_SAME_LOOKS = 0.5  # least correlation at which the looks are learnt: below, something else hides a part of it
+_SAME_LOOKS = 0.5  # least correlation at which the looks are learnt
+_SURE_LOOKS = 0.8  # least correlation at which an object is recognised far from its place
+_FAR_GATE = 3.0  # how far, in gates
 
 
 class _EyeTrack:
@@ -61,8 +67,8 @@ class _ObjectTrack:
     def __init__(self, object_id: int, class_id: int) -> None:
         self.object_id, self.class_id = object_id, class_id
         self.eyes: list[_EyeTrack | None] = [None, None]
-        self.seen_s = -math.inf
-        self.parallax_rad = self.log_size = math.nan
+        self.seen_s, self.pairs = -math.inf, 0
+        self.parallax_rad = self.log_size = self.nearness_per_m = math.nan
         self.looks: Descriptor | None = None
 
     def pixels(self, stamp_s: float, geometry: PairGeometry | None) -> list[Array | None]:
@@ -77,10 +83,20 @@ class _ObjectTrack:
             places.append(None if place is None or not np.isfinite(place).all() else place)
         return places
 
-    def update(self, seen: ObjectMeasures, stamp_s: float, geometry: PairGeometry | None) -> None:
-        """Update by what is seen of it."""
-        for eye, box in enumerate(seen.boxes.sure):
-            if box is None:
+    @staticmethod
+    def off_px(boxes: ObjectBoxes, pixels: list[Array | None]) -> list[float | None]:
+        """Return how far each eye's box is from where it should be; None where one of the two is not known."""
+        return [
+            None if place is None or box is None else float(np.hypot(*(place - box.center_px)))
+            for place, box in zip(pixels, boxes.sure, strict=True)
+        ]
+
+    def update(self, seen: ObjectMeasures, stamp_s: float, geometry: PairGeometry | None, gate_px: float) -> None:
+        """Update by what is seen of it; where one eye's box is in its place, the other's must be too to count."""
+        off_px = self.off_px(seen.boxes, self.pixels(stamp_s, geometry))
+        one_in_place = min((off for off in off_px if off is not None), default=math.inf) <= gate_px
+        for eye, (box, off) in enumerate(zip(seen.boxes.sure, off_px, strict=True)):
+            if box is None or (one_in_place and off is not None and off > gate_px):
                 continue
             pixel = box.center_px
             place = np.array(pixel) if geometry is None else geometry.direction(eye == 0, pixel)
@@ -89,13 +105,18 @@ class _ObjectTrack:
                 self.eyes[eye] = _EyeTrack(place, stamp_s)
             else:
                 track.update(place, stamp_s)
-        self.seen_s = stamp_s
+        self.seen_s, self.pairs = stamp_s, self.pairs + 1
         self.parallax_rad = _averaged(self.parallax_rad, seen.parallax_rad, _PARALLAX_GAIN)
         self.log_size = _averaged(self.log_size, seen.log_size, _SIZE_GAIN)
+        if seen.point_m is not None:
+            nearness = 1.0 / float(np.linalg.norm(seen.point_m))
+            self.nearness_per_m = _averaged(self.nearness_per_m, nearness, _PARALLAX_GAIN)
         correlation = descriptor_correlation(self.looks, seen.looks)
-        if correlation is None:
-            self.looks = seen.looks if self.looks is None else self.looks
-        elif correlation > _SAME_LOOKS and self.looks is not None and seen.looks is not None:
+        if seen.hidden:
+            return
+        if self.looks is None:
+            self.looks = seen.looks
+        elif correlation is not None and correlation > _SAME_LOOKS and seen.looks is not None:
             mixed = (1.0 - _LOOKS_GAIN) * self.looks + _LOOKS_GAIN * seen.looks
             self.looks = np.asarray(mixed / np.linalg.norm(mixed), np.float32)
 
@@ -126,17 +147,18 @@ class ObjectTracks:
 
         """
         self._forget(stamp_s)
-        seen = [measured(boxes, images, geometry) for boxes in objects_of(found)]
+        boxes = objects_of(found)
+        seen = [measured(one, boxes, images, geometry) for one in boxes]
         costs = np.full((len(self._tracks), len(seen)), math.inf)
         for i, track in enumerate(self._tracks):
             pixels = track.pixels(stamp_s, geometry)
             for j, one in enumerate(seen):
                 costs[i, j] = self._cost(track, one, pixels, stamp_s)
-        owner = {j: self._tracks[i] for i, j in optimal_assignment(costs)}
+        owner = {j: self._tracks[i] for i, j in _assignment(costs)}
         objects = []
         for j, one in enumerate(seen):
             track = owner.get(j) or self._new(one.boxes.shown.class_id)
-            track.update(one, stamp_s, geometry)
+            track.update(one, stamp_s, geometry, self.parameters.gate_px)
             objects.append(_object(track, one))
         return objects
 
@@ -171,32 +193,42 @@ class ObjectTracks:
         """Return the sum of squared deviations of what is seen from an object; inf where it cannot be that one."""
         if track.class_id != seen.boxes.shown.class_id:
             return math.inf
-        off_px = [
-            float(np.hypot(*(place - box.center_px)))
-            for place, box in zip(pixels, seen.boxes.sure, strict=True)
-            if place is not None and box is not None
-        ]
+        off_px = [off for off in track.off_px(seen.boxes, pixels) if off is not None]
         # What is out of sight may move aside: its place is known the worse the longer it is.
         gate_px = self.parameters.gate_px * (1.0 + min(stamp_s - track.seen_s, _LARGEST_GATE_GROWTH))
-        if not off_px or np.mean(off_px) > gate_px:
+        correlation = descriptor_correlation(track.looks, seen.looks)
+        recognised = correlation is not None and correlation > _SURE_LOOKS
+        # Of boxes that are no pair one may be in its place all the same: then its depth is wrong.
+        least_px = min(off_px, default=math.inf)
+        if least_px > gate_px * (_FAR_GATE if recognised else 1.0):
             return math.inf
-        cost = (float(np.mean(off_px)) * _GATE_SIGMAS / gate_px) ** 2
+        cost = _TENTATIVE_COST if track.pairs < _TENTATIVE_PAIRS else 0.0
+        cost += _squared(least_px, gate_px / _GATE_SIGMAS)
         cost += _squared(track.parallax_rad - seen.parallax_rad, _PARALLAX_SIGMA_RAD)
         cost += _squared(track.log_size - seen.log_size, _SIZE_SIGMA)
-        correlation = descriptor_correlation(track.looks, seen.looks)
-        cost += 0.0 if correlation is None else _squared(1.0 - correlation, _LOOKS_SIGMA)
+        if correlation is not None:
+            cost += ((1.0 - correlation) / (_HIDDEN_LOOKS_SIGMA if seen.hidden else _LOOKS_SIGMA)) ** 2
         return cost if cost <= _MAX_COST else math.inf
 
 
+def _assignment(costs: Array) -> list[tuple[int, int]]:
+    """Return the (row, column) pairs of the least sum, where each that is left alone costs half of _MAX_COST."""
+    rows, columns = costs.shape
+    alone = np.full((rows, rows), math.inf)
+    alone[np.diag_indices(rows)] = 0.5 * _MAX_COST
+    new = np.full((columns, columns), math.inf)
+    new[np.diag_indices(columns)] = 0.5 * _MAX_COST
+    whole = np.block([[costs, alone], [new, np.zeros((columns, rows))]])
+    return [(i, j) for i, j in optimal_assignment(whole) if i < rows and j < columns]
+
+
 def _object(track: _ObjectTrack, seen: ObjectMeasures) -> SeenObject:
-    distance_m = version_rad = tilt_rad = math.nan
+    version_rad = tilt_rad = math.nan
     if seen.point_m is not None:
         x, y, z = (float(value) for value in seen.point_m)
         version_rad, tilt_rad = math.atan2(y, math.hypot(x, z)), math.atan2(-z, x)
-        # The averaged parallax is steadier than that of one pair.
-        ratio = seen.parallax_rad / track.parallax_rad if track.parallax_rad > 0.0 < seen.parallax_rad else 1.0
-        distance_m = math.hypot(x, y, z) * ratio
-    return SeenObject(track.object_id, seen.boxes, version_rad, tilt_rad, distance_m, _size_px(track, seen))
+    distance_m, size_px = 1.0 / track.nearness_per_m, _size_px(track, seen)
+    return SeenObject(track.object_id, seen.boxes, version_rad, tilt_rad, distance_m, size_px)
 
 
 def _size_px(track: _ObjectTrack, seen: ObjectMeasures) -> float:
