@@ -51,6 +51,8 @@ class Screen:
         style = "" if snapshot.now_s - stream.arrived_s < _STALE_S else "dim"
         judged = ("good", "verged") if state.verged else ("warn", "not verged")
         yield ((style or "bold", f"  {state.phase_name:<8} "), judged, (style, f"  {state.reason}"))
+        if state.attention not in ("", "disabled"):
+            yield ((style, f"  attention {state.attention}"),)
         residuals = (state.version_residual_rad, state.vergence_residual_rad, state.tilt_residual_rad)
         yield (
             (style, f"  version {_degrees(state.version_rad)}  vergence {_degrees(state.vergence_rad)}"),

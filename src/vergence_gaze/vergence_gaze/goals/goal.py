@@ -73,6 +73,14 @@ class TrackRequest:
 
 
 @dataclass(frozen=True)
+class ObjectRequest:
+    """Which object the detector is to measure: one of a class ("": any), or this one of it while it is seen."""
+
+    class_name: str = ""
+    object_id: int = 0
+
+
+@dataclass(frozen=True)
 class Outcome:
     """How a goal ended."""
 

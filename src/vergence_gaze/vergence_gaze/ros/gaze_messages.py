@@ -15,15 +15,17 @@ from vergence_common.stamps import to_seconds, to_stamp
 from vergence_gaze.control.report import GazeReport
 from vergence_gaze.estimation.observations import (
     BoxSighting,
+    DetectedObject,
     EdgeContrast,
     EyeRotationObservation,
     JointReport,
     JointResolution,
     TrackSighting,
 )
-from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, TrackRequest
+from vergence_gaze.goals.goal import Goal, GoalKind, ObjectRequest, Outcome, TrackRequest
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack
+from vergence_msgs.msg import ObjectRequest as ObjectRequestMessage
 from vergence_msgs.msg import TrackRequest as TrackRequestMessage
 from vergence_rig.camera import CameraModel
 from vergence_rig.eye_image import EyeImage
@@ -86,6 +88,12 @@ def track_request(request: TrackRequest, images: tuple[EyeImage, EyeImage]) -> T
     return message
 
 
+def object_request(request: ObjectRequest, now_s: float) -> ObjectRequestMessage:
+    """Return what the detector is asked for."""
+    header = Header(stamp=to_stamp(now_s))
+    return ObjectRequestMessage(header=header, class_name=request.class_name, object_id=request.object_id)
+
+
 def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
     """Return the detected target."""
     seen = (
@@ -112,6 +120,8 @@ def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
         whole=message.status not in (BoxVergence.STATUS_CUT, BoxVergence.STATUS_OCCLUDED),
         surface_sigma_rad=message.refined_sigma_px / focal_px,
         extent_height_rad=(message.left.y_max_px - message.left.y_min_px) / focal_px,
+        object_id=message.object_id,
+        objects=tuple(DetectedObject(one.object_id, one.class_name) for one in message.objects),
     )
 
 
@@ -221,6 +231,7 @@ def gaze_state(report: GazeReport, now_s: float) -> GazeState:
         phase=int(report.phase),
         phase_name=report.phase.name.lower(),
         reason=report.reason,
+        attention=report.attention,
         law=report.law,
         mode=report.mode,
         verged=report.verged,
