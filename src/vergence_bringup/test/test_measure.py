@@ -224,7 +224,8 @@ def test_the_papers_table_has_the_shapes_both_directions_and_the_two_lists(pair,
         *(f"{name}.png" for name in ("left", "right", "left_edges", "right_edges", "combined_edges", "boxes")),
     }
     taken, kept = cv2.imread(pair[0]), cv2.imread(str(tmp_path / "paper" / "left.png"))
-    assert kept is not None and taken is not None
+    assert kept is not None
+    assert taken is not None
     assert np.array_equal(kept, taken)
 
 
