@@ -9,7 +9,7 @@ from vergence_sim.camera_parameters import CameraParameters, RightCameraParamete
 from vergence_sim.clock_parameters import ClockParameters
 from vergence_sim.heads import HeadParameters
 
-TARGETS = ("cube", "marker", "straw", "cable", "stick")
+TARGETS = ("cube", "marker", "straw", "cable", "stick", "box")
 DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
 MOTIONS = ("static", "step", "ramp", "sinusoid", "stations")
 _MOST_EXTRA_CUBES, _MOST_LOOK_ALIKES = 3, 6
