@@ -13,7 +13,7 @@ from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.sighted import in_both_eyes, in_left_eye
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
 from vergence_metric.tracking.track import Track, TrackStatus
-from vergence_metric.tracking.tracked_target import Target, parallax, vergence_of
+from vergence_metric.tracking.tracked_target import Target, disparity_of_parallax, parallax, vergence_of
 
 USUAL_EXTENT_PX = (60.0, 60.0)
 _TURNED_PX = 2.0  # change of the vergence since the last match up to which the expected disparity is searched alone
@@ -86,7 +86,7 @@ def track_requested(
     target.appearance.accept(pair.left, sighting, renew=disparity.ok)
     target.update_direction(pair.stamp_s, views[0].direction(sighting.pixel))
     track = in_left_eye(target, sighting, disparity.reason or "another distance is likelier")
-    ranked = [(target.disparity_of(one.parallax_rad, sighting.pixel, views), one.weight) for one in depths.ranked]
+    ranked = [(disparity_of_parallax(one.parallax_rad, sighting.pixel, views), one.weight) for one in depths.ranked]
     track = replace(track, candidates=tuple((d, weight) for d, weight in ranked if d is not None))
     if likeliest:
         track = in_both_eyes(track, target, disparity, views, pair.stamp_s)
