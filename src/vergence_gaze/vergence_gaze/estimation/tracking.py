@@ -60,11 +60,15 @@ class TargetTracking(TargetEstimator):
         self._start(RequestGate())
 
     def _start(
-        self, asked: RequestGate, point: RequestedPoint | None = None, by_class: RequestedClass | None = None
+        self,
+        asked: RequestGate,
+        point: RequestedPoint | None = None,
+        by_class: RequestedClass | None = None,
+        motion: bool = False,
     ) -> None:
         """Remove the target, and pass sightings through the gates of what is asked for from now on."""
         self.remove_target()
-        self.point, self._class, self._asked = point, by_class, asked
+        self.point, self._class, self._asked, self._motion = point, by_class, asked, motion
         self.ambiguity = ""
         """Which distances the target may have, while several fit."""
         self._request: TrackRequest | None = None
@@ -84,6 +88,11 @@ class TargetTracking(TargetEstimator):
     def class_name(self) -> str | None:
         """The requested class ("": any), None while no class is requested."""
         return self._asked.class_name
+
+    @property
+    def awaits_motion(self) -> bool:
+        """True while nothing has moved since it was asked for."""
+        return self._motion and not self.filter.initialised
 
     @property
     def follows_stream(self) -> bool:
@@ -112,6 +121,10 @@ class TargetTracking(TargetEstimator):
     def request_class(self, class_name: str, goal_id: int) -> None:
         """Start with any target of a detected class ("": of any class), wherever it is."""
         self._start(RequestGate(goal_id, class_name), by_class=RequestedClass(goal_id, self._p.target.lost_after_s))
+
+    def request_motion(self, goal_id: int) -> None:
+        """Start with whatever moves next, as the tracker answers for this goal."""
+        self._start(RequestGate(goal_id), motion=True)
 
     def request_stream(self) -> None:
         """Start with the next point of the stream."""
