@@ -57,6 +57,10 @@ class AffineCamera:
         other._covariance = self._covariance
         return other
 
+    def turn(self, jacobian: Points) -> None:
+        """Say that the eye has turned: what was a step of (2,) px is now `jacobian` (2, 2) times it."""
+        self._state[:, :3] = jacobian @ self._state[:, :3]
+
     def move(self, origin_px: Points) -> None:
         """Say where the origin is expected; the next `fit` starts there."""
         self._state[:, 3] = origin_px

@@ -57,6 +57,13 @@ class EyeView:
         rays = np.column_stack([np.cos(tilt) * cos_pan, np.sin(pan), -np.sin(tilt) * cos_pan])
         return np.asarray(self.camera.ray_to_pixel(rays @ self._rig_from_optical))
 
+    def stretch(self, before: "EyeView", at_px: Points) -> Points:
+        """Return what the turn from an earlier view makes of small steps about its pixel (2,), as a matrix (2, 2)."""
+        steps = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+        there = self.pixels(before.angles(at_px + steps))
+        matrix = (there[1:] - there[0]).T
+        return matrix if np.isfinite(matrix).all() else np.eye(2)
+
     @cached_property
     def _rig_from_optical(self) -> np.ndarray:
         return rotation_rig_from_optical(self.pan_rad, self.tilt_rad, self.pitch_rad)

@@ -9,10 +9,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from vergence_metric.disparity.protocol import DisparityEstimator
 from vergence_metric.tracking.eye_view import Pixel
 from vergence_metric.tracking.locking_tracker import LockingTracker, fovea_of
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair, TrackRequest
+from vergence_metric.tracking.requested_target import pixel_in_left_eye
 from vergence_metric.tracking.saccade_detector import EyeMotion
 from vergence_metric.tracking.track import NOWHERE, Track, TrackStatus
 from vergence_rig.camera import CameraModel
@@ -25,7 +27,8 @@ _CONFIDENCE_WITHOUT_DISPARITY = 0.6
 class Fix:
     """Where a target is in a pair; the disparity is NaN where it is not found in the right eye, and `reason` says why.
 
-    `confidence` is 0 to 1, for the position in the left eye alone.
+    `confidence` is 0 to 1, for the position in the left eye alone. `candidates` are the disparities that it may have,
+    each with its likelihood, while several fit: then the disparity is the likeliest one's.
     """
 
     left_px: Pixel
@@ -35,6 +38,7 @@ class Fix:
     extent_px: Pixel
     confidence: float
     reason: str = ""
+    candidates: tuple[tuple[float, float], ...] = ()
 
 
 class TargetModel(Protocol):
@@ -67,9 +71,14 @@ class ModelledTracker(LockingTracker[Followed]):
     """Follows one target by a model that `learn` makes of it."""
 
     def __init__(
-        self, learn: Learn, parameters: TrackerParameters, camera: CameraModel, kinematics: Kinematics
+        self,
+        learn: Learn,
+        estimator: DisparityEstimator,
+        parameters: TrackerParameters,
+        camera: CameraModel,
+        kinematics: Kinematics,
     ) -> None:
-        self._learn = learn
+        self._learn, self._estimator = learn, estimator
         super().__init__(parameters, camera, kinematics)
 
     @property
@@ -79,9 +88,7 @@ class ModelledTracker(LockingTracker[Followed]):
         return None if target is None or isinstance(target.model, str) else target.model
 
     def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Followed:
-        point = request.pixel
-        if not request.left_eye:
-            point = pair.views[0].pixel(pair.views[1].direction(point))
+        point = request.pixel if request.left_eye else pixel_in_left_eye(request.pixel, pair, self._estimator)
         model = self._learn(pair, point, request.extent_px)
         return Followed(self._track_id, pair.stamp_s, request.goal_id, model, pair.stamp_s)
 
@@ -105,6 +112,12 @@ class ModelledTracker(LockingTracker[Followed]):
             return self._nowhere(target, TrackStatus.LOST, f"target hidden for {hidden_s:.1f} s: {fix}")
         target.seen_s = pair.stamp_s
         seen = math.isfinite(fix.disparity_px)
+        if fix.candidates:
+            status, reason = TrackStatus.AMBIGUOUS, fix.reason
+        elif seen:
+            status, reason = TrackStatus.OK, ""
+        else:
+            status, reason = TrackStatus.OCCLUDED, f"target not found in the right eye: {fix.reason}"
         right_px = (fix.left_px[0] - fix.disparity_px, fix.left_px[1] - fix.vertical_px) if seen else NOWHERE
         return Track(
             target.track_id,
@@ -116,9 +129,10 @@ class ModelledTracker(LockingTracker[Followed]):
             fix.sigma_px if seen else math.nan,
             fix.extent_px,
             fix.confidence * (1.0 if seen else _CONFIDENCE_WITHOUT_DISPARITY),
-            TrackStatus.OK if seen else TrackStatus.OCCLUDED,
-            "" if seen else f"target not found in the right eye: {fix.reason}",
+            status,
+            reason,
             target.goal_id,
+            fix.candidates,
         )
 
     def _nowhere(self, target: Followed, status: TrackStatus, reason: str) -> Track:

@@ -117,4 +117,4 @@ def moving_target_tracker(
 ) -> ModelledTracker:
     """Return the tracker `moving_target`; see `protocol.Tracker`."""
     learn = partial(learn_moving_target, estimator=estimator, parameters=parameters, kinematics=kinematics)
-    return ModelledTracker(learn, parameters, camera, kinematics)
+    return ModelledTracker(learn, estimator, parameters, camera, kinematics)

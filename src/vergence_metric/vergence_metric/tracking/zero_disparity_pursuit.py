@@ -137,4 +137,4 @@ def zero_disparity_tracker(
 ) -> ModelledTracker:
     """Return the tracker `zero_disparity`; see `protocol.Tracker`."""
     learn = partial(learn_zero_disparity, estimator=estimator, parameters=parameters, baseline_m=kinematics.baseline_m)
-    return ModelledTracker(learn, parameters, camera, kinematics)
+    return ModelledTracker(learn, estimator, parameters, camera, kinematics)
