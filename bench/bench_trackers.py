@@ -4,6 +4,7 @@ Everything is driven by the true image positions: all see the same sequences. Co
 """
 
 import math
+import os
 from collections.abc import Callable, Iterable
 
 import cv2
@@ -17,6 +18,7 @@ from bench.trackers_photographs import NoPhotographsError, photograph_rig, seque
 from bench.trackers_runs import DETECTOR, NAIVE, Run, run_detector, run_tracker
 from bench.trackers_scenes import SCENES, THINGS, Frame, rig, sequence
 from bench.trackers_scores import Score, score, step_px
+from vergence_common.blas_threads import limit_blas_threads
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.registry import tracker_names
 
@@ -33,6 +35,7 @@ def run(say: Say) -> list[Row]:
     """Measure; each kind's row has the default's beside it."""
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
+    limit_blas_threads(1)  # a second thread would only wait, and its waiting counts as CPU time
     try:
         scores, steps = _rendered(say)
         rows = _rows(scores) + _goals(scores, steps)
@@ -44,6 +47,7 @@ def run(say: Say) -> list[Row]:
         return rows + cepstrum_rows(say)
     finally:
         cv2.setNumThreads(threads)
+        limit_blas_threads(os.cpu_count() or 1)
 
 
 def table(rows: Iterable[Row]) -> str:

@@ -63,11 +63,13 @@ class CepstralEstimator(DisparityEstimator):
         p, answers = self._parameters, []
         greys = left.astype(np.float32), right.astype(np.float32)
         for side in _SIDES_PX:
-            window = _Window(greys, point_px, side)
+            window = EchoWindow(greys, point_px, side)
             if window.deviation < p.min_texture:
                 continue
-            peaks = window.peaks(p.max_px, p.max_vertical_px)
-            lead = peaks[0].height / max(peaks[1].height, 1e-6)
+            peaks = _highest(window.heights(p.max_px, p.max_vertical_px))
+            if not peaks:
+                continue
+            lead = peaks[0].height / max(peaks[1].height, 1e-6) if len(peaks) > 1 else math.inf
             answers.append((lead, window, peaks))
             if peaks[0].height >= _LEAST_HEIGHT and lead >= _LEAST_LEAD:
                 break
@@ -91,22 +93,32 @@ class CepstralEstimator(DisparityEstimator):
             status, reason = DisparityStatus.NO_MATCH, "the echo does not settle where its peak is"
         elif abs(across) > p.max_px + 0.5 or abs(down) > p.max_vertical_px + 0.5:
             status, reason = DisparityStatus.OUT_OF_RANGE, f"the peak lies at {across:+.1f}, {down:+.1f} px"
-        confidence = 1.0 - math.exp(-0.5 * max(best.height - 0.5 * _LEAST_HEIGHT, 0.0)) / max(lead - 0.5, 0.5)
-        confidence = float(np.clip(confidence, 0.0, 1.0 if status is DisparityStatus.OK else 0.5))
+        # Half at the least lead that counts, and the surer the farther the second peak is below.
+        confidence = max(1.0 - 0.5 * (_LEAST_LEAD / lead) ** 2, 0.0)
+        if status is not DisparityStatus.OK:
+            confidence = min(confidence, 0.5)
         return Disparity(across, down, _SIGMA_PX, confidence, status, reason, self.name, point_px, candidates)
 
 
-class _Window:
-    """The tapered window of the left image about a point, and its echoes in windows of the right one."""
+class EchoWindow:
+    """The tapered window of the left image about a point, and its echoes in windows of the right one.
+
+    `deviation` is the standard deviation of what it holds [grey levels].
+    """
 
     def __init__(self, greys: tuple[Grey, Grey], point_px: Point, side: int) -> None:
+        """Cut the window, `side` px wide and high, of grey images (h, w) float32, left and right."""
         self._right, self._point_px, self.side = greys[1], point_px, side
         self._first = _tapered_at(greys[0], point_px, side)
         weights = _taper(side)
         self.deviation = float(np.sqrt((self._first**2).sum() / (weights**2).sum()))
 
-    def peaks(self, reach_px: int, vertical_px: int) -> list[CepstralPeak]:
-        """Return the two or more highest peaks within reach, the highest first."""
+    def heights(self, reach_px: int, vertical_px: int) -> NDArray[np.float64]:
+        """Return the heights of the cepstra (2 vertical_px + 3, 2 reach_px + 1) over both disparities.
+
+        Rows are vertical disparities from `vertical_px` + 1 down to -`vertical_px` - 1, columns horizontal ones from
+        -`reach_px` up. Unknown ones, outside the right image, are -inf.
+        """
         step = self.side // 2
         count = max(math.ceil(reach_px / step), 1)
         shifts = np.arange(-count, count + 1) * step
@@ -123,8 +135,7 @@ class _Window:
             # Content right of the window's middle by c is at the disparity shift - c.
             at = middle + shift - columns
             heights[:, at] = np.maximum(heights[:, at], part)
-        inside = heights[:, middle - reach_px : middle + reach_px + 1]
-        return _highest(inside, rows, reach_px)
+        return heights[:, middle - reach_px : middle + reach_px + 1]
 
     def refined(self, peak: CepstralPeak) -> tuple[float, float] | None:
         """Return the disparities of a peak to a fraction of a pixel; None where it does not settle."""
@@ -174,12 +185,14 @@ def _cepstrum(first: Grey, second: Grey) -> NDArray[np.float64]:
     return np.asarray(cepstrum / max(float(about.std()), 1e-12))
 
 
-def _highest(heights: NDArray[np.float64], rows: NDArray[np.intp], reach_px: int) -> list[CepstralPeak]:
+def _highest(heights: NDArray[np.float64]) -> list[CepstralPeak]:
+    """Return up to four peaks of heights as `EchoWindow.heights` gives them, the highest first."""
     left, peaks = heights.copy(), []
+    middle_row, middle_column = (size // 2 for size in heights.shape)
     for _ in range(4):
         j, i = divmod(int(left.argmax()), left.shape[1])
         if not np.isfinite(left[j, i]):
             break
-        peaks.append(CepstralPeak(float(i - reach_px), float(-rows[j]), float(left[j, i])))
+        peaks.append(CepstralPeak(float(i - middle_column), float(middle_row - j), float(left[j, i])))
         left[:, max(i - _APART_PX, 0) : i + _APART_PX + 1] = -np.inf
     return peaks

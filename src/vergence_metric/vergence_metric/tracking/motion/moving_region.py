@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.tracking.eye_view import EyeView, Pixel
 from vergence_metric.tracking.motion.eye_motion import compensated
-from vergence_metric.tracking.motion.horn_schunck import Flow, horn_schunck
+from vergence_metric.tracking.motion.horn_schunck import Flow, horn_schunck, warped
 from vergence_metric.tracking.motion.occlusion_mesh import occluded
 from vergence_metric.tracking.zero_disparity import filled
 
@@ -30,7 +30,7 @@ _FLOOR_PX = 0.5  # of flow from pair to pair, at this width
 _FLOOR_MEDIANS = 4.0
 _CLOSING_PX, _OPENING_PX = 9, 5
 _LEAST_AREA_PX, _MOST_SHARE = 200, 0.4
-_BORDER_PX = 4
+_COMPARED_PX, _NOISE = 5, 0.5  # window over which images are compared; grey levels
 _LATEST_S = 0.25  # pairs farther apart show no flow
 
 
@@ -84,6 +84,7 @@ class MotionDetector:
         magnitude = np.hypot(flow[..., 0], flow[..., 1])
         hidden = ~reached | occluded(small, flow)
         magnitude[cv2.dilate((~reached).astype(np.uint8), np.ones((9, 9), np.uint8)) > 0] = 0.0
+        magnitude[_at_rest(small, turned, flow)] = 0.0
         moving = self._moving(magnitude, hidden)
         if isinstance(moving, str):
             return moving
@@ -102,6 +103,18 @@ class MotionDetector:
         level, _ = cv2.threshold(levels.reshape(1, -1), 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
         moving = (magnitude > max(floor_px, level * top_px / 255.0)) & ~hidden
         return np.asarray(moving)
+
+
+def _at_rest(now: Image, turned: Image, flow: Flow) -> Mask:
+    """Return which pixels (h, w) look as if they had not moved, rather than as the flow says.
+
+    Smooth flow goes on beyond what moves.
+    """
+    still, moved = (
+        cv2.boxFilter(cv2.absdiff(now, other), cv2.CV_32F, (_COMPARED_PX, _COMPARED_PX))
+        for other in (turned, warped(turned, flow))
+    )
+    return np.asarray(moved > still + _NOISE)
 
 
 def _component(
