@@ -10,7 +10,7 @@ from vergence_sim.clock_parameters import ClockParameters
 from vergence_sim.heads import HeadParameters
 from vergence_sim.persons import PersonParameters
 
-TARGETS = ("cube", "marker", "straw", "cable", "stick")
+TARGETS = ("cube", "marker", "straw", "cable", "stick", "box")
 DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
 MOTIONS = ("static", "step", "ramp", "sinusoid", "stations")
 _MOST_EXTRA_CUBES, _MOST_LOOK_ALIKES = 3, 6

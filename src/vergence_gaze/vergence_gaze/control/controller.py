@@ -24,7 +24,7 @@ from vergence_gaze.estimation.observations import (
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, ObjectRequest, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
-from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, RequestedTarget, resolve_goal
+from vergence_gaze.goals.goal_resolution import ClassRequest, MotionRequest, RequestedPose, RequestedTarget, resolve_goal
 from vergence_gaze.joints.feedback import FeedbackMonitor
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.joint_reports import in_eye_angles
@@ -144,6 +144,9 @@ class GazeController:
         elif isinstance(request, ClassRequest):
             tracking.request_class(request.class_name, goal_id)
             self._requests.ask_object(ObjectRequest(request.class_name))
+        elif isinstance(request, MotionRequest):
+            tracking.request_motion(goal_id)
+            self._requests.ask(TrackRequest(goal_id, motion=True))
         else:
             start = now_s, request.stamp_s, request.angles_rad, request.covariance, goal_id
             if goal.kind is GoalKind.POINT:
@@ -398,10 +401,12 @@ class GazeController:
             eyes_still=self._perception.eyes_still(state.now_s, state.commanded_rad, self._law.lands_at_rest),
             travel_s=float((np.abs(residual) / state.speed_rad_s).max()),
             verged=self._perception.judge.verged,
-            # Without images there is nothing to be found in them; a stream of points needs none.
+            # Without images there is nothing to be found in them; a stream of points needs none. What moves is waited
+            # for: eyes that turn see less of it.
             may_search=tracking.follows_stream
             or (
                 not self._perception.images_missing(state.now_s)
+                and not tracking.awaits_motion
                 and (tracking.class_name is not None or lost_s > self._p.search.after_s)
                 and (self._attention.may_search or not self._attention.engaged)
             ),

@@ -76,8 +76,8 @@ def track_sighting(message: TargetTrack, left_image: EyeImage) -> TrackSighting:
 
 def track_request(request: TrackRequest, images: tuple[EyeImage, EyeImage]) -> TrackRequestMessage:
     """Return the request in raw pixels of the eye's image."""
-    message = TrackRequestMessage(goal_id=request.goal_id)
-    if request.goal_id:
+    message = TrackRequestMessage(goal_id=request.goal_id, motion=request.motion)
+    if request.goal_id and not request.motion:
         image = images[0 if request.left_eye else 1]
         message.header.stamp = to_stamp(request.stamp_s)
         message.eye = TrackRequestMessage.EYE_LEFT if request.left_eye else TrackRequestMessage.EYE_RIGHT
