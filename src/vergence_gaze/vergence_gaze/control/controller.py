@@ -24,7 +24,13 @@ from vergence_gaze.estimation.observations import (
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, ObjectRequest, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
-from vergence_gaze.goals.goal_resolution import ClassRequest, MotionRequest, RequestedPose, RequestedTarget, resolve_goal
+from vergence_gaze.goals.goal_resolution import (
+    ClassRequest,
+    MotionRequest,
+    RequestedPose,
+    RequestedTarget,
+    resolve_goal,
+)
 from vergence_gaze.joints.feedback import FeedbackMonitor
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.joint_reports import in_eye_angles
@@ -158,7 +164,7 @@ class GazeController:
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
 
-    def _resolved(self, goal: Goal, now_s: float) -> RequestedTarget | RequestedPose | ClassRequest:
+    def _resolved(self, goal: Goal, now_s: float) -> RequestedTarget | RequestedPose | ClassRequest | MotionRequest:
         if not self._enabled:
             raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
         kinematics, history = self._perception.kinematics, self._perception.history
