@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = sorted((ROOT / "src").glob("vergence*"))
 PYTHON_PACKAGES = [path for path in PACKAGES if (path / "setup.py").is_file()]
 ROSDEP_KEYS = {
+    "aiohttp": "python3-aiohttp",
     "cv2": "python3-opencv",
     "hypothesis": "python3-hypothesis",
     "numpy": "python3-numpy",

@@ -38,7 +38,9 @@ def test_a_plotted_field_is_recorded_and_exists(path):
     topic, field = split(path)
     package, _, name = TOPICS[topic].split("/")
     kind = getattr(importlib.import_module(f"{package}.msg"), name)
-    name, index = re.fullmatch(r"(\w+)(\[\d\])?", field).groups()
+    parts = re.fullmatch(r"(\w+)(\[\d\])?", field)
+    assert parts is not None
+    name, index = parts.groups()
     declared = kind.get_fields_and_field_types()[name]
     assert ("sequence" in declared) == (index is not None)
 

@@ -1,6 +1,7 @@
 """PointHead: which axes can be pointed, how far they are off, and that no joint is faster than asked."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -63,7 +64,7 @@ def test_the_error_is_0_at_the_point_and_what_the_pan_is_off_beside_it(x: float,
     assert pointing_error_rad("", (x, y, z), beside, KINEMATICS) == off_rad
 
 
-def pointed(images: bool = True, **pace: float) -> tuple[Outcome, float]:
+def pointed(images: bool = True, **pace: Any) -> tuple[Outcome, float]:
     """Return how a goal at a point ended, and the largest commanded speed until then [rad/s]."""
     head = FakeHead(RIG, lambda time_s: np.array(POINT_M), seed=2)
     controller = GazeController(RIG, gaze_parameters(), CONTROL_TICKS * TICK_S)
@@ -74,7 +75,7 @@ def pointed(images: bool = True, **pace: float) -> tuple[Outcome, float]:
         if round(head.time_s / TICK_S) % CONTROL_TICKS:
             continue
         if head.time_s > 0.2 and not asked:
-            goal = Goal(GoalKind.POINT, point_m=POINT_M, **pace)  # type: ignore[arg-type]
+            goal = Goal(GoalKind.POINT, point_m=POINT_M, **pace)
             controller.check(goal, head.time_s)
             controller.look_at(goal, head.time_s)
             asked = True
@@ -107,13 +108,13 @@ def test_it_takes_no_less_than_the_asked_time() -> None:
 
 
 @pytest.mark.parametrize("pace", [{"max_speed_rad_s": -1.0}, {"max_speed_rad_s": math.nan}, {"min_duration_s": -1.0}])
-def test_a_pace_that_cannot_be_is_refused(pace: dict[str, float]) -> None:
+def test_a_pace_that_cannot_be_is_refused(pace: dict[str, Any]) -> None:
     with pytest.raises(GoalError, match="must be"):
         pointed(**pace)
 
 
 @pytest.mark.parametrize("pace", [{}, {"max_speed_rad_s": 0.1}], ids=["at full speed", "slowly"])
-def test_without_images_the_joints_alone_reach_a_point_that_needs_none(pace: dict[str, float]) -> None:
+def test_without_images_the_joints_alone_reach_a_point_that_needs_none(pace: dict[str, Any]) -> None:
     outcome, _ = pointed(images=False, needs_images=False, **pace)
     assert outcome.result is Result.AT_POINT, outcome
     failed, _ = pointed(images=False, **pace)

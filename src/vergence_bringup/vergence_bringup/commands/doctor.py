@@ -23,6 +23,7 @@ from vergence_rig.finding import Finding
 from vergence_rig.install_hint import install_hint
 
 _PACKAGES = {
+    "aiohttp": ("python3-aiohttp", "aiohttp"),
     "numpy": ("python3-numpy", "numpy"),
     "cv2": ("python3-opencv", "opencv-python-headless"),
     "yaml": ("python3-yaml", "PyYAML"),

@@ -11,7 +11,7 @@ from vergence_msgs.action import LookAt
 from vergence_msgs.msg import GazeGoal
 
 _GOAL_FIELDS = (
-    *("kind", "point", "eye", "left_x_px", "left_y_px", "right_x_px", "right_y_px", "depth_m"),
+    *("kind", "point", "eye", "left_x_px", "left_y_px", "right_x_px", "right_y_px", "depth_m", "width_px", "height_px"),
     *("version_rad", "vergence_rad", "tilt_rad", "class_name"),
 )
 
@@ -52,6 +52,8 @@ def _in_words(request: LookAt.Goal) -> str:
             return f"version, vergence and tilt {angles} degrees from where the eyes are"
         case LookAt.Goal.CLASS:
             return f"a target of class {request.class_name}"
+        case LookAt.Goal.MOTION:
+            return "whatever moves next"
     return f"a goal of kind {request.kind}, which does not exist"
 
 

@@ -68,6 +68,10 @@ class GoalServer:
         """Return whether a result is the action's success."""
         return result is Result.VERGED
 
+    def _ending(self, request: Any, outcome: Outcome) -> Outcome:
+        """Return an outcome as it is reported."""
+        return outcome
+
     def _on_rejected(self, request: Any, result: Result, reason: str) -> None:
         self._node.get_logger().warning(f"{self._name}: goal rejected as {result.name}: {reason}")
 
@@ -105,7 +109,7 @@ class GoalServer:
 
     def _execute(self, handle: ServerGoalHandle) -> Any:
         """Return the result of a goal that has ended."""
-        outcome = self._outcomes.pop(bytes(handle.goal_id.uuid))
+        outcome = self._ending(handle.request, self._outcomes.pop(bytes(handle.goal_id.uuid)))
         if self._succeeded(outcome.result):
             handle.succeed()
         elif outcome.result is Result.CANCELLED and handle.is_cancel_requested:

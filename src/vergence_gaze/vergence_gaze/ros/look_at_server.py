@@ -12,7 +12,7 @@ from vergence_common.stamps import to_seconds
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.control.report import GazeReport
 from vergence_gaze.goals.goal import Goal, Outcome, Result
-from vergence_gaze.goals.requested_class import check_class
+from vergence_gaze.goals.requested_class import check_class, with_detector
 from vergence_gaze.ros import gaze_messages as convert
 from vergence_gaze.ros.goal_reports import gaze_goal
 from vergence_gaze.ros.goal_server import GoalServer
@@ -70,6 +70,11 @@ class LookAtServer(GoalServer):
     def _on_ended(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
         super()._on_ended(handle, outcome)
         self._publish(handle, GazeGoal.ENDED, outcome)
+
+    def _ending(self, request: Any, outcome: Outcome) -> Outcome:
+        return (
+            with_detector(outcome, request.class_name, self.classes) if request.kind == LookAt.Goal.CLASS else outcome
+        )
 
     def _publish(self, handle: ServerGoalHandle, state: int, outcome: Outcome | None = None) -> None:
         message = gaze_goal(handle.request, state, self._now_s(), outcome)
