@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence_servo.trajectory import Trajectory, TrajectoryPoint
@@ -28,6 +28,7 @@ def at(tilt_rad: float) -> dict[str, float]:
     return {"tilt": tilt_rad, "pan_left": 1.0}
 
 
+@settings(deadline=None)
 @given(st.floats(0.0, 1.99))
 def test_nothing_stated_allows_any_error_on_the_way(time_s: float) -> None:
     assert goal().update(BEGIN_S + time_s, at(3.0)) is None
