@@ -1,5 +1,6 @@
 """A click asks the tracker for its point; once the tracker answers, nothing else near the fovea is the target."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -32,12 +33,14 @@ def commands(head: FakeHead, controller: GazeController, until_s: float, answer_
     return done
 
 
-def clicked(vision: VisionModel, **mistaken) -> tuple[FakeHead, GazeController]:
+def clicked(
+    vision: VisionModel, extent_rad: tuple[float, float] = (math.nan, math.nan), **mistaken
+) -> tuple[FakeHead, GazeController]:
     head = FakeHead(default_rig(), lambda time_s: PLACE, vision, 3, mistaken=mistaken)
     controller = GazeController(default_rig(), gaze_parameters(), 6 * TICK_S)
     commands(head, controller, 0.2)
     x, y = head.project(PLACE, left=True)
-    goal = Goal(GoalKind.PIXEL, left_xy=(float(x), float(y)), stamp_s=0.15, time_limit_s=60.0)
+    goal = Goal(GoalKind.PIXEL, left_xy=(float(x), float(y)), stamp_s=0.15, time_limit_s=60.0, extent_rad=extent_rad)
     controller.look_at(goal, head.time_s)
     return head, controller
 
@@ -48,6 +51,13 @@ def test_a_click_asks_for_its_point_in_its_own_image() -> None:
     requests = [command.track_request for command in commands(head, controller, 0.4)]
     assert requests[0] == TrackRequest(1, 0.15, True, (float(x), float(y)))
     assert set(requests[1:]) == {None}
+
+
+def test_a_box_asks_for_a_thing_of_its_size() -> None:
+    head, controller = clicked(VisionModel(), extent_rad=(0.1, 0.05))
+    asked = commands(head, controller, 0.4)[0].track_request
+    assert asked is not None
+    assert asked.extent_rad == (0.1, 0.05)
 
 
 def test_boxes_of_something_else_do_not_pull_the_eyes() -> None:

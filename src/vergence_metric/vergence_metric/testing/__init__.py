@@ -1,1 +1,1 @@
-"""Test doubles of the metric's tests."""
+"""Test doubles: detectors and scenes with known answers, for tests and benchmarks."""
