@@ -111,7 +111,7 @@ build() {
     fail "the build failed: the whole output is in log/bootstrap.txt"
   fi
   printf '%s' "$sum" >"$stamp"
-  say "built: $(find install -maxdepth 1 -name 'vergence_*' | wc -l) packages"
+  say "built: $(find install -maxdepth 1 -name 'vergence*' | wc -l) packages"
 }
 
 make_venv

@@ -16,7 +16,7 @@ from vergence_gaze.estimation.observations import JointReport, JointResolution, 
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
-from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, resolve_goal
+from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, RequestedTarget, resolve_goal
 from vergence_gaze.joints.feedback import FeedbackMonitor
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.joint_reports import in_eye_angles
@@ -103,6 +103,10 @@ class GazeController:
         """
         return point_in_rig(point_m, frame, stamp_s, self._perception.history, self._perception.kinematics)
 
+    def check(self, goal: Goal, now_s: float) -> None:
+        """Raise GoalError for a goal that cannot be started now; nothing changes."""
+        self._resolved(goal, now_s)
+
     def look_at(self, goal: Goal, now_s: float) -> int:
         """Start a goal and return its id; the active one ends as PREEMPTED.
 
@@ -110,10 +114,7 @@ class GazeController:
         """
         goal_id = self._goals.new_id()
         try:
-            if not self._enabled:
-                raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
-            kinematics, history = self._perception.kinematics, self._perception.history
-            request = resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
+            request = self._resolved(goal, now_s)
         except GoalError as error:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
@@ -141,6 +142,12 @@ class GazeController:
                 self._requests.ask(TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy, goal.extent_rad))
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
+
+    def _resolved(self, goal: Goal, now_s: float) -> RequestedTarget | RequestedPose | ClassRequest:
+        if not self._enabled:
+            raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
+        kinematics, history = self._perception.kinematics, self._perception.history
+        return resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
 
     def cancel(self, now_s: float, goal_id: int | None = None) -> bool:
         """End the active goal (or only if it is `goal_id`) as CANCELLED and hold still; False if there is none."""
