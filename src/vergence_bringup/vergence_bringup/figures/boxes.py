@@ -22,8 +22,8 @@ class BoxFigures:
 
     `left_minus_right_px` is in the order of CORNERS. `center_px` and `refined_px` are the disparities of the boxes'
     centres and of the surface inside them, (horizontal, vertical). `left_xyxy_px` and `right_xyxy_px` are the boxes,
-    `scores` the detector's for (left, right). `left_point_px` and `right_point_px` are what a goal looks at: between the
-    eyes of a face, else the box's middle.
+    `scores` the detector's for (left, right). `left_point_px` and `right_point_px` are what a goal looks at: between
+    the eyes of a face, else the box's middle.
     """
 
     status: str
