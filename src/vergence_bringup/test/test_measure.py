@@ -168,7 +168,7 @@ def red_cell(folder, x):
     return str(path)
 
 
-def test_layout_and_labels_of_a_model_that_does_not_tell_them(tmp_path, capsys):
+def test_layout_and_labels_of_a_model_that_names_neither(tmp_path, capsys):
     pair, model = (red_cell(tmp_path, 48), red_cell(tmp_path, 32)), built(tmp_path, "yolov8_rows")
     command = ["measure", *pair, "--windows", "50", "--json", "--model", model]
     assert main(command) == 2
