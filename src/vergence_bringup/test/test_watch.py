@@ -62,7 +62,7 @@ def test_the_distance_of_a_detected_target_has_its_interval():
     face.distance_m, face.distance_low_m, face.distance_high_m = 1.0, 0.85, 1.2
     made["vergence/box"].add(face, 10.0)
     (line,) = (line for line in view(made) if "boxes face" in line)
-    assert re.search(r"boxes face +\+12\.50 px  1\.00 m \(0\.85 to 1\.20 m\)", line)
+    assert re.search(r"boxes face +12\.50 px  1\.00 m \(0\.85 to 1\.20 m\)", line)
     face.distance_m = math.nan
     assert "0.85" not in next(line for line in view(made) if "boxes face" in line)
 
