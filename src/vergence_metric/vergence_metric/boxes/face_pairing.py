@@ -1,6 +1,6 @@
 """How well two faces, one of each eye, are one person's: by the shape that their landmarks make, its size, its depth.
 
-The eyes of persons are about 63 mm apart, as far as the head's: a face's size and its disparity tell the same distance.
+The eyes of persons are about 63 mm apart, as far as the head's: a face's size and its disparity give the same distance.
 """
 
 import math
