@@ -102,20 +102,20 @@ def identify_geometry(
     Raises:
         IdentifyError: limits too close together, a scene with too little texture or depth, or one that moves.
     """
-    planned = planned_poses(rig, parameters)
+    first, *planned = planned_poses(rig, parameters)
     progress(f"geometry: looking from {len(planned)} poses")
     cameras = head.cameras()
+    look = head.look(first)
+    cameras = {eye: _sized(cameras[eye], look.sizes_px[eye], eye) for eye in EYES}
     found: list[Features] = []
-    joints_rad = []
-    for number, pose in enumerate(planned):
+    joints_rad = [[float(angle) for angle in look.joints_rad]]
+    for pose in planned:
         look = head.look(pose)
-        if number == 0:
-            cameras = {eye: _sized(cameras[eye], look.sizes_px[eye], eye) for eye in EYES}
         joints_rad.append([float(angle) for angle in look.joints_rad])
         found += [features(look.pictures[eye]) for eye in EYES]
         scales = [look.sizes_px[eye][0] / look.pictures[eye].shape[1] for eye in EYES]
     check_texture(found)
-    poses = visited(rig, joints_rad, joints_rad[0])
+    poses = visited(rig, joints_rad[1:], joints_rad[0])
     seen = _in_whole_images(_tracked(found, rig, cameras, poses), scales, cameras)
     check_sightings(seen, len(found))
     progress(f"  {int(seen.point.max()) + 1} things found again from several poses, {len(seen.view)} sightings")

@@ -41,6 +41,7 @@ Array = npt.NDArray[np.float64]
 
 _NAMED_DISTANCES = 4
 _FARTHEST_M = 10.0
+_LEARNT_RAD = 0.001  # change of half a joint's play from which the target's estimate starts anew
 _RESTED_S = 0.05  # an image shows where a move ended once the joints have rested this long
 
 
@@ -200,7 +201,11 @@ class TargetTracking(TargetEstimator):
         if direction_only:
             measurement, seen_rad = without_depth(measurement, seen_rad)
         if sighting.source == "track" and self._class is None:
-            self._observe_play(sighting.stamp_s, sighting.skew_s, seen_rad)
+            learnt = self._observe_play(sighting.stamp_s, sighting.skew_s, seen_rad)
+            if learnt and np.isfinite(seen_rad).all():
+                # Until now the target seemed to move by what the joints did not.
+                measurement, seen_rad = sighting.locate()
+                self.initialise_from(measurement)
         if not self.filter.initialised:
             self.initialise_from(measurement)
         accepted = self.update(measurement, seen_rad, sighting.skew_s, now_s, sighting.source)
@@ -227,14 +232,18 @@ class TargetTracking(TargetEstimator):
             distances_m.append(f"{distance_m:.2f} m" if distance_m < _FARTHEST_M else "far away")
         return f"{track.reason}: {', '.join(distances_m)}" if len(distances_m) > 1 else track.reason
 
-    def _observe_play(self, stamp_s: float, skew_s: float, seen_rad: Array) -> None:
-        """Learn the joints' play from a target at rest that eyes at rest have just seen at these angles (3,)."""
+    def _observe_play(self, stamp_s: float, skew_s: float, seen_rad: Array) -> bool:
+        """Learn the joints' play from a target that eyes at rest have just seen at these angles (3,).
+
+        Returns whether it is now another than the target's estimate was made with.
+        """
         first, last = sorted((stamp_s, stamp_s + skew_s))
-        if self.filter.moving or self._history.speed_within(first - _RESTED_S, last) > 0.0:
-            return
+        if self._history.speed_within(first - _RESTED_S, last) > 0.0:
+            return False
         at_left, at_right = self._history.shaft_at(stamp_s), self._history.shaft_at(last)
-        axes_rad = np.array([at_left[0], at_right[1], at_left[2]])
+        axes_rad, before_rad = np.array([at_left[0], at_right[1], at_left[2]]), self._history.half_play_rad.copy()
         self._history.play.observe(stamp_s, self._history.reported_at(stamp_s), seen_rad - axes_rad)
+        return bool(np.abs(self._history.half_play_rad - before_rad).max() > _LEARNT_RAD)
 
 
 __all__ = ["SightingError", "TargetTracking"]

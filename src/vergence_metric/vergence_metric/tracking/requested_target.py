@@ -122,7 +122,10 @@ def find_by_surroundings(
     if found is None:
         return None
     alike = found.similarity >= p.request_similarity
-    if target.found and not (alike and (target.hidden or found.at_point >= p.anchor_similarity)):
+    if alike:
+        target.most_at_point = max(target.most_at_point, found.at_point)
+    itself = found.at_point >= target.most_at_point - (1.0 - p.anchor_similarity)
+    if target.found and not (alike and (target.hidden or itself)):
         return None
     if alike and target.hidden:
         target.appearance = TargetAppearance(left, found.pixel, target.appearance.extent_px)

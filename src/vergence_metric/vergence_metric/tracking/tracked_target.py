@@ -38,6 +38,7 @@ class Target:
     patch: RememberedPatch | None = None  # of a requested target
     depths: DepthHypotheses | None = None  # of a requested target
     found: bool = True  # since its request
+    most_at_point: float = 0.0  # of a requested target: what noise leaves of the point's similarity with itself
     goal_id: int = 0
     sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # recent stamps and directions
     unbounded_pairs: int = 0  # in which it might have been segmented
