@@ -199,6 +199,8 @@ class TargetTracker:
             pair = StoredPair(stamp_s, left, right, views)
             return track_requested(target, target.depths, sighting, pair, self._estimator, p.place_spread_px)
         fixated = target.fixated_px(sighting.pixel)
+        if not _inside(fixated, left):
+            fixated = sighting.pixel
         expected_px = target.expected_disparity(fixated, views)
         disparity = self._estimator.estimate(left, right, fixated, expected_px)
         if not disparity.ok and fixated != sighting.pixel:
