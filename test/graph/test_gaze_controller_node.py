@@ -166,10 +166,19 @@ def test_a_class_that_the_detector_does_not_look_for_is_refused_at_once(scene: S
     result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cub", time_limit_s=ENDLESS_S)))
     assert result.result == LookAt.Result.INVALID
     assert result.reason == "class_name must be one that the detector looks for (cube, ball, cup): got 'cub'"
+    result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="face", time_limit_s=ENDLESS_S)))
+    assert result.result == LookAt.Result.INVALID
+    assert "got 'face'; faces need YuNet: the file face_detection_yunet_2023mar.onnx" in result.reason
     handle = scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cube", time_limit_s=ENDLESS_S))
     scene.until(lambda: scene.states[-1].phase == GazeState.PHASE_SEARCH, "the class is searched for")
     scene.cancel(handle)
     assert scene.result(handle).result == LookAt.Result.CANCELLED
+
+
+def test_a_face_that_nothing_detects_ends_with_what_is_missing(scene: Scene) -> None:
+    result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="face", time_limit_s=0.5)))
+    assert result.result in (LookAt.Result.TIMED_OUT, LookAt.Result.LOST)
+    assert "box_metric_node must run; faces need YuNet" in result.reason
 
 
 def test_angles_are_reached_exactly(scene: Scene) -> None:

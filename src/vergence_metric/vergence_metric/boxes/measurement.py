@@ -20,7 +20,7 @@ from vergence_metric.boxes.parameters import BoxMetricParameters
 from vergence_metric.boxes.refinement import refine
 from vergence_metric.boxes.result import NAN2, UNREFINED, BoxStatus, BoxVergenceResult
 from vergence_metric.boxes.seen_object import ObjectBoxes
-from vergence_metric.boxes.smoothing import LagLimitedFilter
+from vergence_metric.boxes.smoothing import LagLimitedFilter, smoothed_pair
 from vergence_metric.boxes.target_choice import RequestedObject, TargetChoice
 from vergence_metric.boxes.target_point import TargetPoint, locate
 from vergence_metric.boxes.uncertainty import direction_sigma_px, disparity_sigma_px
@@ -221,12 +221,12 @@ class BoxMeasurement:
             refined=replace(refined, horizontal_px=surface_px[0], vertical_px=surface_px[1]),
             left_rad=_angles(models and models[0], left),
             right_rad=_angles(models and models[1], right),
-            point=self._located(left, metric.center_px, refined, sigma_px, source_per_input, geometry),
+            point=self._located((left, right), metric.center_px, refined, sigma_px, source_per_input, geometry),
         )
 
     def _located(
         self,
-        left: Box,
+        boxes: tuple[Box, Box],
         center_px: NDArray[np.float64],
         refined: Any,
         sigma_px: float,
@@ -235,26 +235,24 @@ class BoxMeasurement:
     ) -> TargetPoint | None:
         if geometry is None:
             return None
+        left, right = boxes
         disparity = (refined.horizontal_px, refined.vertical_px)
         sigma = refined.sigma_px
         if not math.isfinite(disparity[0]):
-            disparity, sigma = (float(center_px[0]), float(center_px[1])), sigma_px
+            landmarks = bool(left.landmarks_px and right.landmarks_px)
+            disparity = tuple(np.subtract(left.point_px, right.point_px) if landmarks else center_px)
+            sigma = sigma_px
         if not all(math.isfinite(value) for value in disparity):
             return None
-        right_px = left.center_px[0] - disparity[0], left.center_px[1] - disparity[1]
+        x, y = left.point_px
+        right_px = x - float(disparity[0]), y - float(disparity[1])
         sigmas = (direction_sigma_px(left, source_per_input), sigma, JOINT_SIGMA_RAD)
-        return locate(
-            left.center_px, right_px, (geometry.left, geometry.right), geometry.eyes, self._kinematics, sigmas
-        )
+        return locate((x, y), right_px, (geometry.left, geometry.right), geometry.eyes, self._kinematics, sigmas)
 
     def _smoothed(self, pair: BoxPair, stamp_s: float) -> tuple[Box, Box]:
         if self._parameters.measurement.smoothing_lag_s == 0.0:
             return pair.left, pair.right
-        sides = self._filter.update(stamp_s, np.array([*pair.left.xyxy_px, *pair.right.xyxy_px]))
-        return (
-            replace(pair.left, xyxy_px=(float(sides[0]), float(sides[1]), float(sides[2]), float(sides[3]))),
-            replace(pair.right, xyxy_px=(float(sides[4]), float(sides[5]), float(sides[6]), float(sides[7]))),
-        )
+        return smoothed_pair(self._filter, stamp_s, pair.left, pair.right)
 
     def _update_vertical(self, offset_px: float) -> None:
         """Update the mounts' vertical offset by a complete pair: the mean of the first ones, then a slow low pass."""
@@ -285,7 +283,7 @@ def measure_pair(
 def _angles(model: CameraModel | None, box: Box | None) -> tuple[float, float]:
     if model is None or box is None:
         return NAN2
-    azimuth, elevation = model.angles([box.center_px])[0]
+    azimuth, elevation = model.angles([box.point_px])[0]
     return float(azimuth), float(elevation)
 
 

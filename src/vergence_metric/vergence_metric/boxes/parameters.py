@@ -32,8 +32,8 @@ class DetectorParameters(Parameters):
     )
     threshold: float = parameter(
         0.0,
-        "least score of an object; 0 takes the one in the model's metadata, else 0.35. An export with suppression "
-        "inside has its own threshold, which this one can only raise",
+        "least score of an object; 0 takes the one in the model's metadata, else 0.35, of YuNet 0.6. An export with "
+        "suppression inside has its own threshold, which this one can only raise",
         minimum=0.0,
         maximum=1.0,
         formerly="threshold",
@@ -84,6 +84,12 @@ class DetectorParameters(Parameters):
         choices=_layout_choices,
         read_only=True,
         formerly="layout",
+    )
+    labels: str = parameter(
+        "",
+        "file of the classes' names: one a line, or 'names' in a YAML or JSON file; coco for the 80 classes of COCO; "
+        "empty takes those in the model's metadata, else COCO's for a model of 80 classes, else numbers",
+        read_only=True,
     )
     color: str = parameter(
         "auto",

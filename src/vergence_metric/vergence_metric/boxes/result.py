@@ -41,9 +41,9 @@ class BoxVergenceResult:
     differences in raw pixels. `center_px`, `refined` are disparities of the boxes' centres and of the surface (mean
     over what both eyes see), (horizontal, vertical), without lens distortion if camera models are given; `center_rad`
     is the centres' in angle. `sigma_px` is the standard deviation of the horizontal `center_px`. `left_rad` and
-    `right_rad` are the target's directions in each eye, azimuth (right positive) and elevation (down positive).
-    `point` is where it is in rig_base, None if unknown. `objects` are all that are in view, `target` is the chosen one
-    of them, None without one, and `choice_reason` says why.
+    `right_rad` are the directions of the target's point (`Box.point_px`) in each eye, azimuth (right positive) and
+    elevation (down positive). `point` is where it is in rig_base, None if unknown. `objects` are all that are in view,
+    `target` is the chosen one of them, None without one, and `choice_reason` says why.
     """
 
     status: BoxStatus

@@ -105,12 +105,10 @@ def measured(
     shown = boxes.shown
     point, parallax = None, math.nan
     if geometry is not None and left is not None and right is not None:
-        directions = geometry.direction(True, left.center_px), geometry.direction(False, right.center_px)
-        azimuths = [math.atan2(direction[1], direction[0]) for direction in directions]
-        parallax = azimuths[1] - azimuths[0]
+        parallax = geometry.parallax_rad(left.point_px, right.point_px)
         cameras = geometry.left, geometry.right
         try:
-            point = meeting(left.center_px, right.center_px, cameras, geometry.eyes, geometry.kinematics)
+            point = meeting(left.point_px, right.point_px, cameras, geometry.eyes, geometry.kinematics)
         except GeometryError:
             point = None
     image = None if images is None else images[0 if left is not None else 1]

@@ -3,6 +3,7 @@
 As in binocular harvesting heads: detector, matching inside the region, mean disparity, triangulation.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +15,25 @@ from vergence_rig.kinematics import Kinematics
 
 Array = NDArray[np.float64]
 
+_SIGMAS_95 = 1.96
+
 
 @dataclass(frozen=True)
 class TargetPoint:
-    """A point (3,) in rig_base [m] and its covariance (3, 3) [m^2]."""
+    """A point (3,) in rig_base [m] and its covariance (3, 3) [m^2].
+
+    `interval_m` is the interval of its distance from rig_base that holds the true one with a probability of 95 %; inf
+    where it may be any distance away. It is not symmetric: the distance goes with the reciprocal of the vergence.
+    """
 
     point_m: Array
     covariance_m2: Array
+    interval_m: tuple[float, float]
+
+    @property
+    def distance_m(self) -> float:
+        """The distance from rig_base."""
+        return float(np.linalg.norm(self.point_m))
 
 
 def locate(
@@ -62,8 +75,18 @@ def locate(
             columns.append(point(step) - point(-step))
     except GeometryError:
         return None
+    # All that turns the eyes against each other, as a turn of the right one.
+    turn_rad = math.hypot(disparity_px / cameras[1].fx_px, joint_rad, joint_rad)
+    interval = []
+    for sign in (1.0, -1.0):
+        step = np.zeros(6)
+        step[4] = sign * _SIGMAS_95 * turn_rad
+        try:
+            interval.append(float(np.linalg.norm(point(step))))
+        except GeometryError:
+            interval.append(math.inf)
     spread = np.column_stack(columns)
-    return TargetPoint(center, np.asarray(spread @ spread.T))
+    return TargetPoint(center, np.asarray(spread @ spread.T), (interval[0], interval[1]))
 
 
 def meeting(

@@ -22,8 +22,8 @@ POINT_FRAME = "rig_base"
 def box_message(box: Box | None) -> BoundingBox:
     """Return a box as a message; all NaN for None."""
     if box is None:
-        nan = math.nan
-        return BoundingBox(x_min_px=nan, y_min_px=nan, x_max_px=nan, y_max_px=nan, score=nan, class_id=-1)
+        figures = ("x_min_px", "y_min_px", "x_max_px", "y_max_px", "score", "point_x_px", "point_y_px")
+        return BoundingBox(class_id=-1, **dict.fromkeys(figures, math.nan))
     x_min, y_min, x_max, y_max = box.xyxy_px
     return BoundingBox(
         x_min_px=x_min,
@@ -37,6 +37,10 @@ def box_message(box: Box | None) -> BoundingBox:
         cut_top=box.cut[1],
         cut_right=box.cut[2],
         cut_bottom=box.cut[3],
+        point_x_px=box.point_px[0],
+        point_y_px=box.point_px[1],
+        landmarks_x_px=[x for x, _ in box.landmarks_px],
+        landmarks_y_px=[y for _, y in box.landmarks_px],
     )
 
 
@@ -66,6 +70,7 @@ def box_vergence_message(
         [float(value) for value in values]
         for values in (result.corners.left_minus_right_px, result.corners.right_minus_left_px)
     )
+    distances_m = result.point.interval_m if result.point is not None else (math.nan, math.nan)
     return BoxVergence(
         header=header,
         pair_skew_s=pair_skew_s,
@@ -93,6 +98,9 @@ def box_vergence_message(
         left_elevation_rad=result.left_rad[1],
         right_azimuth_rad=result.right_rad[0],
         right_elevation_rad=result.right_rad[1],
+        distance_m=result.point.distance_m if result.point is not None else math.nan,
+        distance_low_m=distances_m[0],
+        distance_high_m=distances_m[1],
         class_name=result.class_name,
         object_id=result.object_id,
         choice_reason=result.choice_reason,

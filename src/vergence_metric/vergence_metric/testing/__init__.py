@@ -1,1 +1,1 @@
-"""Test doubles: a head without hardware for tests and benchmarks."""
+"""Test doubles: detectors and scenes with known answers, for tests and benchmarks."""
