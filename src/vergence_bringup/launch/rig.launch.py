@@ -44,6 +44,8 @@ def files(executable: str, values: Mapping[str, str]) -> list[str]:
 def settings(values: Mapping[str, str]) -> Settings:
     found: Settings = {f"{eye}_camera": ("camera_node", camera(eye, values)) for eye in EYES}
     chosen = {"edge_metric_node": {}, "gaze_controller_node": {}}
+    if values["attend"] == "true":
+        chosen["gaze_controller_node"] = {"start": "attend"}
     if values["detector"] == "true":
         chosen["box_metric_node"] = {"detector.model": values["model"]}
     if values["encoder"] == "true":

@@ -1,6 +1,6 @@
 """The whole graph on the simulated head: sim_node, the metric nodes, gaze_controller_node.
 
-ros2 launch vergence_bringup sim.launch.py [preset:=ideal] [head:=rig] [detector:=false] [encoder:=false]
+ros2 launch vergence_bringup sim.launch.py [preset:=ideal] [head:=rig] [detector:=false] [encoder:=false] [attend:=true]
     [namespace:=head] [use_sim_time:=true] [web:=true]
 """
 
@@ -22,6 +22,8 @@ def build(values: Mapping[str, str]) -> list[Any]:
         "sim_node": {"preset": values["preset"], "head.model": values["head"]},
         "web_node": {"address": values["web_address"]},
     }
+    if values["attend"] == "true":
+        own["gaze_controller_node"] = {"start": "attend"}
     nodes = [node(name, parameters=shared | own.get(name, {})) for name in executables]
     return head(values, *nodes, *frames(values, use_sim_time=shared["use_sim_time"]))
 

@@ -152,6 +152,15 @@ def test_the_lock_can_be_left_off():
     assert [given["lock"] for given in cameras] == ["off", "off"]
 
 
+@pytest.mark.parametrize("file", ["sim.launch.py", "rig.launch.py", "laptop.launch.py"])
+def test_attention_is_chosen_by_an_argument(file):
+    def start(**arguments):
+        return next(given for name, given in nodes(file, **arguments) if name == "gaze_controller_node").get("start")
+
+    assert start(attend="true") == "attend"
+    assert start() is None
+
+
 def test_a_model_of_ones_own_reaches_the_detector(tmp_path):
     model = tmp_path / "fruit.onnx"
     model.touch()

@@ -100,7 +100,7 @@ def models(monkeypatch):
     )
     nothing = Detections(np.zeros((0, 4)), np.zeros(0), np.zeros(0, np.int64), (), (621, 401))
 
-    def measure_pair(left, right, model):
+    def measure_pair(left, right, model, parameters):
         asked.append(model)
         return BoxVergenceResult(
             BoxStatus.CUT, "a box is cut", nothing, nothing, *boxes, corner_metric(*boxes), center_px=(math.nan, 1.75)
@@ -121,6 +121,7 @@ def test_a_model_adds_metric_ii_both_ways_with_null_for_a_cut_side(pair, models,
     assert box["center_px"] == [None, 1.75]
     assert box["scores"] == [0.9, 0.8]
     assert box["right_xyxy_px"] == [28.0, 48.0, 128.0, 148.5]
+    assert box["left_point_px"] == [90.0, 100.0]
     assert figures["windows_px"]
     picture = cv2.imread(str(tmp_path / "boxes.png"))
     assert picture is not None
@@ -152,6 +153,62 @@ def test_a_bad_model_is_one_line_and_nothing_is_printed(pair, tmp_path, capsys, 
     assert words in printed.err
 
 
+def built(folder, layout, **options):
+    pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
+    from vergence_metric.testing.onnx_detectors import build_detector
+
+    return str(build_detector(folder / "model.onnx", layout, **options))
+
+
+def red_cell(folder, x):
+    image = np.zeros((96, 128, 3), np.uint8)
+    image[16:32, x : x + 16, 2] = 255
+    path = folder / f"cell_{x}.png"
+    cv2.imwrite(str(path), image)
+    return str(path)
+
+
+def test_layout_and_labels_of_a_model_that_names_neither(tmp_path, capsys):
+    pair, model = (red_cell(tmp_path, 48), red_cell(tmp_path, 32)), built(tmp_path, "yolov8_rows")
+    command = ["measure", *pair, "--windows", "50", "--json", "--model", model]
+    assert main(command) == 2
+    assert "say which by the parameter 'detector.layout'" in capsys.readouterr().err
+    assert main([*command, "--layout", "yolov8_rows"]) == 0
+    box = json.loads(capsys.readouterr().out)["box"]
+    assert (box["class"], box["center_px"][0]) == ("0", pytest.approx(16.0, abs=1e-3))
+    (tmp_path / "names.txt").write_text("tomato\nleaf\n")
+    assert main([*command, "--labels", str(tmp_path / "names.txt")]) == 0
+    assert json.loads(capsys.readouterr().out)["box"]["class"] == "tomato"
+
+
+def test_the_point_of_a_face_is_between_its_eyes(tmp_path, capsys):
+    pair, model = (red_cell(tmp_path, 48), red_cell(tmp_path, 32)), built(tmp_path, "yunet")
+    assert main(["measure", *pair, "--windows", "50", "--json", "--model", model]) == 0
+    box = json.loads(capsys.readouterr().out)["box"]
+    assert box["class"] == "face"
+    # The built faces have their eyes a fifth of a cell below the cell's top.
+    assert box["left_point_px"] == pytest.approx([55.5, 18.7], abs=1e-3)
+    assert box["right_point_px"] == pytest.approx([39.5, 18.7], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--layout", "yolov8"), "--layout needs --model FILE"),
+        (("--labels", "coco"), "--labels needs --model FILE"),
+        (("--model", "shipped", "--layout", "yolov3"), "'layout' must be one of 'auto', 'yolov6'"),
+        (("--model", "shipped", "--labels", "gone.txt"), "labels gone.txt"),
+        (("--model", "shipped", "--labels", "coco"), "labels coco must name all classes of the model, 1: got 80"),
+    ],
+)
+def test_options_that_do_not_fit_are_one_line(pair, capsys, arguments, words):
+    assert main(["measure", *pair, *arguments]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert words in printed.err
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real pairs (../shared/data/stereo_chessboard) are not here")
 @pytest.mark.parametrize("number", [1, 4])
 def test_real_pairs(number, tmp_path, capsys):
@@ -177,7 +234,10 @@ def test_the_papers_table_has_the_shapes_both_directions_and_the_two_lists(pair,
     assert saved == {
         *(f"{name}.png" for name in ("left", "right", "left_edges", "right_edges", "combined_edges", "boxes")),
     }
-    assert np.array_equal(cv2.imread(str(tmp_path / "paper" / "left.png")), cv2.imread(pair[0]))
+    taken, kept = cv2.imread(pair[0]), cv2.imread(str(tmp_path / "paper" / "left.png"))
+    assert kept is not None
+    assert taken is not None
+    assert np.array_equal(kept, taken)
 
 
 def test_the_papers_table_without_a_detector_says_so(pair, tmp_path, capsys, monkeypatch):

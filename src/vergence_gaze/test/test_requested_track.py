@@ -85,6 +85,30 @@ def test_a_goal_without_a_pixel_frees_the_tracker(kind: GoalKind) -> None:
     assert controller.step(1.02, []).track_request == TrackRequest(0)
 
 
+def test_motion_is_waited_for_with_still_eyes_and_then_verged_on() -> None:
+    head = FakeHead(default_rig(), lambda time_s: PLACE, VisionModel(), 3, visible=lambda time_s: time_s > 2.0)
+    controller = GazeController(default_rig(), gaze_parameters(), 6 * TICK_S)
+    commands(head, controller, 0.2)
+    controller.look_at(Goal(GoalKind.MOTION, time_limit_s=60.0), head.time_s)
+    start = head.true_rad
+    waiting = commands(head, controller, 2.0)
+    assert [c.track_request for c in waiting if c.track_request is not None] == [TrackRequest(1, motion=True)]
+    np.testing.assert_allclose(head.true_rad, start, atol=0.02)
+    assert not any(command.outcomes for command in waiting)
+    outcomes = [outcome for command in commands(head, controller, 5.0) for outcome in command.outcomes]
+    assert [outcome.result for outcome in outcomes] == [Result.VERGED], outcomes
+    assert np.abs(np.degrees(head.true_errors_rad())).max() < 0.5
+
+
+def test_motion_that_does_not_come_ends_the_goal_with_its_reason() -> None:
+    head = FakeHead(default_rig(), lambda time_s: PLACE, VisionModel(), 3, visible=lambda time_s: False)
+    controller = GazeController(default_rig(), gaze_parameters(), 6 * TICK_S)
+    commands(head, controller, 0.2)
+    controller.look_at(Goal(GoalKind.MOTION, time_limit_s=2.0), head.time_s)
+    outcomes = [outcome for command in commands(head, controller, 3.0) for outcome in command.outcomes]
+    assert [outcome.result for outcome in outcomes] == [Result.LOST], outcomes
+
+
 def test_the_result_is_verged_on_the_point() -> None:
     head, controller = clicked(VisionModel())
     outcomes = [outcome for command in commands(head, controller, 3.0) for outcome in command.outcomes]

@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 import vergence_gaze.laws  # noqa: F401  registers the shipped laws
+from vergence_gaze.attention_parameters import AttentionParameters
 from vergence_gaze.law_registry import law_groups
 from vergence_gaze.parameters import (
     ExposureParameters,
@@ -26,6 +27,7 @@ _FIXED: Groups = (
     ("target.", TargetParameters),
     ("verged.", VergedParameters),
     ("search.", SearchParameters),
+    ("attention.", AttentionParameters),
 )
 _NONE: Mapping[str, Any] = MappingProxyType({})
 
@@ -42,9 +44,9 @@ GROUPS: Groups = gaze_groups()
 def collected(groups: Iterable[Parameters]) -> GazeParameters:
     """Return the controller's parameters from one instance of every group."""
     by_kind: dict[type[Parameters], Any] = {type(group): group for group in groups}
-    control, saccade, exposure, servo, target, verged, search = (by_kind[kind] for _, kind in _FIXED)
+    control, saccade, exposure, servo, target, verged, search, attention = (by_kind[kind] for _, kind in _FIXED)
     laws = tuple(by_kind[kind] for _, kind in law_groups())
-    return GazeParameters(control, saccade, exposure, servo, target, verged, search, laws)
+    return GazeParameters(control, saccade, exposure, servo, target, verged, search, attention, laws)
 
 
 def gaze_parameters(values: Mapping[str, Any] = _NONE) -> GazeParameters:

@@ -8,8 +8,9 @@ from vergence_rig.parameters import Groups, ParameterError, Parameters, paramete
 from vergence_sim.camera_parameters import CameraParameters, RightCameraParameters
 from vergence_sim.clock_parameters import ClockParameters
 from vergence_sim.heads import HeadParameters
+from vergence_sim.persons import PersonParameters
 
-TARGETS = ("cube", "marker", "straw", "cable", "stick")
+TARGETS = ("cube", "marker", "straw", "cable", "stick", "box")
 DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
 MOTIONS = ("static", "step", "ramp", "sinusoid", "stations")
 _MOST_EXTRA_CUBES, _MOST_LOOK_ALIKES = 3, 6
@@ -215,6 +216,7 @@ GROUPS: Groups = (
     ("right_camera.", RightCameraParameters),
     ("target.", TargetParameters),
     ("motion.", MotionParameters),
+    ("persons.", PersonParameters),
 )
 
 NODE_GROUPS: Groups = (*GROUPS, ("clock.", ClockParameters))
@@ -246,6 +248,7 @@ class SimParameters:
     right_camera: RightCameraParameters = field(default_factory=RightCameraParameters)
     target: TargetParameters = field(default_factory=TargetParameters)
     motion: MotionParameters = field(default_factory=MotionParameters)
+    persons: PersonParameters = field(default_factory=PersonParameters)
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> "SimParameters":

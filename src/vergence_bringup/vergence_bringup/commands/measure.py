@@ -42,6 +42,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="print the paper's own table, line for line as its Fig. 12, find the boxes with the shipped detector "
         "unless --model names another, and save left.png and right.png too, in the folder paper without --out",
     )
+    parser.add_argument(
+        "--layout", metavar="NAME", help="layout of the detector's outputs (default: recognised by a run)"
+    )
+    parser.add_argument(
+        "--labels",
+        metavar="FILE",
+        help="file of the detector's class names, or coco (default: those in the model, COCO's for 80 classes)",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of the table")
     parser.add_argument("--windows", type=int, nargs="+", metavar="PX", help="sides of the centre windows in px")
     parser.add_argument(
@@ -71,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         write_image(out / "right_edges.png", result.right_edges.mask)
         write_image(out / "combined_edges.png", combined_edges(result.left_edges.mask, result.right_edges.mask))
     # Before anything is printed, so that an unusable model gives one line of output.
-    boxes = _boxes(left, right, model, out) if model is not None else None
+    boxes = _boxes(left, right, argparse.Namespace(**vars(options) | {"model": model, "out": out}))
     figures: dict[str, list[Any]] = {
         "windows_px": [int(size) for size in result.windows_px],
         "left_to_right_px": _numbers(result.left_to_right_px),
@@ -102,15 +110,23 @@ def _print_table(figures: Mapping[str, Sequence[Any]]) -> None:
         print(f"{f'{size}x{size}':>9}  {row[0]:>13}  {row[1]:>13}  {row[2]:>8}")
 
 
-def _boxes(left: Image, right: Image, model: str, out: Path | None) -> BoxFigures:
+def _boxes(left: Image, right: Image, options: argparse.Namespace) -> BoxFigures | None:
+    """Return metric II of both images, None without a detector."""
+    changes = {name: getattr(options, name) for name in ("layout", "labels") if getattr(options, name) is not None}
+    if options.model is None:
+        if changes:
+            raise ValueError(f"--{next(iter(changes))} needs --model FILE, whose outputs it describes")
+        return None
     # Imported late: onnxruntime is needed for this alone.
     from vergence_metric.boxes import draw, measure_pair
+    from vergence_metric.boxes.parameters import BoxMetricParameters, DetectorParameters
 
-    if not model:
+    if not options.model:
         raise ValueError(f"--model must be the path of an ONNX file, or {SHIPPED}: got an empty string")
-    result = measure_pair(left, right, "" if model == SHIPPED else model)
-    if out is not None:
-        write_image(out / "boxes.png", draw(left, right, result))
+    parameters = BoxMetricParameters(detector=DetectorParameters().replaced(**changes))
+    result = measure_pair(left, right, "" if options.model == SHIPPED else options.model, parameters)
+    if options.out is not None:
+        write_image(options.out / "boxes.png", draw(left, right, result))
     return BoxFigures.from_result(result)
 
 

@@ -81,6 +81,7 @@ _NAMESPACE = LaunchArgument("namespace", "namespace of all nodes of the head")
 _RIG = _file("rig", "path of rig.yaml", shipped="rig.yaml")
 _PROFILE = _file("fastdds_profile", "Fast DDS profile", shipped="fastdds.xml")
 _ENCODER = _switch("encoder", "run eye_rotation_node, the visual encoder of the eyes' angles", "true")
+_ATTEND = _switch("attend", "look at people, and what else is of interest, while no goal is active", "false")
 _FRAMES = LaunchArgument(
     "frames",
     "run robot_state_publisher, which publishes the head's frames on tf; auto: where it is installed",
@@ -111,6 +112,7 @@ _CAMERAS_AND_VISION = (
     _file("identified", "path of rig.nodes.yaml, written by vergence identify"),
     _switch("detector", "run box_metric_node; it needs onnxruntime", "false"),
     _file("model", "ONNX file of the detector; empty for the one of the simulator's cube"),
+    _ATTEND,
     _switch("lock", "hold one exposure and white balance for both cameras", "true"),
     _switch(
         "composed", "run all nodes in one process, head_node: images pass in memory, which saves CPU time", "false"
@@ -136,6 +138,7 @@ ARGUMENTS: dict[str, tuple[LaunchArgument, ...]] = {
         _switch(
             "detector", "run box_metric_node, whose detector finds the simulator's cube; needs onnxruntime", "true"
         ),
+        _ATTEND,
         _ENCODER,
         _FRAMES,
         *_WEB,

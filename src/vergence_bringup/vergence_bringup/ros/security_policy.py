@@ -12,6 +12,9 @@ EYES = ("left", "right")
 OPERATOR = "operator"
 """Enclave of the tools: `vergence look`, `watch`, `identify`, `ros2` and recordings."""
 
+OPERATOR_TOPICS = ("/joint_command", "/gaze/attention", "/gaze/target", "/rosout")
+"""What the operator's tools may publish beside the parameters' events."""
+
 _COMPRESSED = tuple(f"/{eye}/image_raw/compressed" for eye in EYES)
 _DETECTIONS = tuple(f"/vergence/{eye}_detections" for eye in EYES)
 _SHOWN = (
@@ -124,7 +127,7 @@ def _operator() -> list[str]:
     lines = [f"    <enclave path={quoteattr(f'/vergence/{OPERATOR}')}>", "      <profiles>"]
     lines.append('        <profile ns="/" node="*">')
     lines += ['          <topics publish="ALLOW">']
-    lines += [f"            <topic>{name}</topic>" for name in ("/joint_command", "/gaze/target", "/rosout")]
+    lines += [f"            <topic>{name}</topic>" for name in OPERATOR_TOPICS]
     lines += ["            <topic>/parameter_events</topic>", "          </topics>"]
     for group, element, verb in rules:
         lines += [

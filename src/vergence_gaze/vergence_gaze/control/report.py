@@ -9,7 +9,7 @@ import numpy.typing as npt
 from vergence_gaze.control.perception import Perception
 from vergence_gaze.estimation.distance import TargetPosition
 from vergence_gaze.estimation.target_filter import TargetEstimate
-from vergence_gaze.goals.goal import Outcome, TrackRequest
+from vergence_gaze.goals.goal import ObjectRequest, Outcome, TrackRequest
 from vergence_gaze.phases import Phase, PhaseMachine
 from vergence_rig.geometry import EyeAngles, GeometryError
 from vergence_rig.kinematics import Kinematics
@@ -23,7 +23,7 @@ class GazeReport:
     """Angles are estimated, residuals (version, vergence, tilt) are what is left to turn; NaN where unknown.
 
     `fault` says what is wrong with the joints' feedback or the images, `images_missing` whether no results of images
-    arrive.
+    arrive. `attention` is its policy, what it attends to and why.
     `fixation_m` (3,) is the midpoint of the gaze rays' closest approach and `miss_distance_m` how far they pass.
     """
 
@@ -45,20 +45,22 @@ class GazeReport:
     miss_distance_m: float
     fault: str = ""
     images_missing: bool = False
+    attention: str = ""
 
 
 @dataclass(frozen=True)
 class Command:
     """One cycle's result.
 
-    Joint angles (3,) to send, or None; the report; the goals that ended; and what the tracker is to follow from now on,
-    None for no change.
+    Joint angles (3,) to send, or None; the report; the goals that ended; what the tracker is to follow from now on, and
+    which object the detector is to measure, None for no change.
     """
 
     joints_rad: Array | None
     report: GazeReport
     outcomes: tuple[Outcome, ...]
     track_request: TrackRequest | None = None
+    object_request: ObjectRequest | None = None
 
 
 _CLAIM_S = 0.6  # without results of images, after which eyes are no longer said to be verged
@@ -72,6 +74,7 @@ def make_report(
     mode: str,
     rig: Rig,
     fault: str = "",
+    attention: str = "",
 ) -> GazeReport:
     """Return the state at `now_s` under this law and mode; `fault` is that of the feedback or the images."""
     known = perception.history.known and math.isfinite(now_s)
@@ -106,6 +109,7 @@ def make_report(
         miss_distance_m=miss,
         fault=fault,
         images_missing=images_missing,
+        attention=attention,
     )
 
 

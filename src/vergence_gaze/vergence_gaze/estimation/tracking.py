@@ -61,11 +61,17 @@ class TargetTracking(TargetEstimator):
         self._start(RequestGate())
 
     def _start(
-        self, asked: RequestGate, point: RequestedPoint | None = None, by_class: RequestedClass | None = None
+        self,
+        asked: RequestGate,
+        point: RequestedPoint | None = None,
+        by_class: RequestedClass | None = None,
+        motion: bool = False,
     ) -> None:
         """Remove the target, and pass sightings through the gates of what is asked for from now on."""
         self.remove_target()
-        self.point, self._class, self._asked = point, by_class, asked
+        self.point, self._class, self._asked, self._motion = point, by_class, asked, motion
+        self.object_id = 0
+        """The detected object that is the target; 0 while none is."""
         self.ambiguity = ""
         """Which distances the target may have, while several fit."""
         self._request: TrackRequest | None = None
@@ -85,6 +91,11 @@ class TargetTracking(TargetEstimator):
     def class_name(self) -> str | None:
         """The requested class ("": any), None while no class is requested."""
         return self._asked.class_name
+
+    @property
+    def awaits_motion(self) -> bool:
+        """True while nothing has moved since it was asked for."""
+        return self._motion and not self.filter.initialised
 
     @property
     def follows_stream(self) -> bool:
@@ -110,9 +121,21 @@ class TargetTracking(TargetEstimator):
         self.filter.initialise(stamp_s, angles_rad, covariance)
         self.seen_s = now_s
 
-    def request_class(self, class_name: str, goal_id: int) -> None:
-        """Start with any target of a detected class ("": of any class), wherever it is."""
-        self._start(RequestGate(goal_id, class_name), by_class=RequestedClass(goal_id, self._p.target.lost_after_s))
+    def request_class(self, class_name: str, goal_id: int, object_id: int = 0) -> None:
+        """Start with a target of a detected class ("": of any class), wherever it is; with an id this object alone."""
+        by_class = RequestedClass(goal_id, self._p.target.lost_after_s)
+        self._start(RequestGate(goal_id, class_name, object_id), by_class=by_class)
+
+    def is_another(self, box: BoxSighting) -> bool:
+        """Return whether the detector has chosen another object of the requested class as the target than before."""
+        known = self.object_id and box.object_id and box.object_id != self.object_id
+        return bool(
+            known and box.usable and self._asked.class_name in ("", box.class_name) and not self._asked.object_id
+        )
+
+    def request_motion(self, goal_id: int) -> None:
+        """Start with whatever moves next, as the tracker answers for this goal."""
+        self._start(RequestGate(goal_id), motion=True)
 
     def request_stream(self) -> None:
         """Start with the next point of the stream."""
@@ -151,6 +174,8 @@ class TargetTracking(TargetEstimator):
             return self._directions.box(box, sigma, rate_rad_s, self._assumed_vergence_rad(box.stamp_s))
 
         accepted = self._consider(Sighting("box", box, locate, box.skew_s, box.extent_rad), now_s)
+        if accepted:
+            self.object_id = box.object_id
         if accepted and self._class is not None:
             request = self._class.request(box, now_s)
             if request is not None:

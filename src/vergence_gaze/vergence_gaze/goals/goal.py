@@ -14,6 +14,7 @@ class GoalKind(enum.IntEnum):
     ANGLES = 3
     RELATIVE_ANGLES = 4
     CLASS = 5
+    MOTION = 6
 
 
 class Result(enum.IntEnum):
@@ -61,8 +62,8 @@ class Goal:
 class TrackRequest:
     """What the tracker is to follow for a goal: a point (x, y) of one eye's image, in normalised coordinates.
 
-    `extent_rad` are the angular width and height of the object there, NaN if unknown. `goal_id` 0 asks for no point:
-    the tracker is free to follow what lies at the fovea.
+    `extent_rad` are the angular width and height of the object there, NaN if unknown. `motion` asks for whatever moves
+    next instead. `goal_id` 0 asks for no point: the tracker is free to follow what lies at the fovea.
     """
 
     goal_id: int
@@ -70,6 +71,15 @@ class TrackRequest:
     left_eye: bool = True
     xy: tuple[float, float] = (math.nan, math.nan)
     extent_rad: tuple[float, float] = (math.nan, math.nan)
+    motion: bool = False
+
+
+@dataclass(frozen=True)
+class ObjectRequest:
+    """Which object the detector is to measure: one of a class ("": any), or this one of it while it is seen."""
+
+    class_name: str = ""
+    object_id: int = 0
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import CameraInfo, JointState
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
@@ -17,6 +18,7 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_seconds
+from vergence_gaze.attention_parameters import POLICIES
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.control.report import Command, GazeReport
 from vergence_gaze.estimation.observations import Observation, PointSighting
@@ -32,6 +34,7 @@ from vergence_msgs.msg import (
     EdgeVergence,
     EyeRotation,
     GazeState,
+    ObjectRequest,
     TargetTrack,
     TrackRequest,
 )
@@ -70,12 +73,13 @@ class GazeControllerNode(Node):
         self._watch = watch = watch_qos(self, diagnostics)
         self._command = watch.create_publisher(JointState, "joint_command")
         self._track_requests = watch.create_publisher(TrackRequest, "vergence/track_request")
+        # Latched: what holds until the next message, for nodes that start later.
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._object_requests = watch.create_publisher(ObjectRequest, "vergence/object_request", latched)
         self._state = watch.create_publisher(GazeState, "gaze/state")
         self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point")
         self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1))
         self._joint_input = JointStateInput(self, diagnostics, watch, lambda j: self._add(convert.joint_report(j)))
-        # Latched: one message per start of the servos' driver.
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         watch.create_subscription(
             JointState, "servo_node/resolution", lambda m: self._add(convert.joint_resolution(m)), latched
         )
@@ -86,6 +90,7 @@ class GazeControllerNode(Node):
         watch.create_subscription(EyeRotation, "vergence/eye_rotation", lambda m: self._add(convert.eye_rotation(m)))
         watch.create_subscription(DetectorClasses, "vergence/detector_classes", self._on_classes, latched)
         watch.create_subscription(PointStamped, "gaze/target", self._on_target)
+        watch.create_subscription(String, "gaze/attention", self._on_attention)
         watch.create_subscription(CameraInfo, "left/camera_info", lambda m: self._on_camera(m, left=True))
         watch.create_subscription(CameraInfo, "right/camera_info", lambda m: self._on_camera(m, left=False))
         self.create_service(SetBool, "~/enable", self._on_enable)
@@ -127,6 +132,15 @@ class GazeControllerNode(Node):
             return
         self._add(PointSighting(stamp_s, place, math.nan))
 
+    def _on_attention(self, message: String) -> None:
+        if message.data in POLICIES:
+            self._controller.set_attention(message.data, self._now_s())
+        else:
+            allowed = ", ".join(POLICIES)
+            self.get_logger().warning(
+                f"a policy on gaze/attention was ignored: it must be one of {allowed}: got {message.data!r}"
+            )
+
     def _on_camera(self, message: CameraInfo, left: bool) -> None:
         described = (message.width, message.height, message.distortion_model, tuple(message.k), tuple(message.d))
         if self._described.get(left) == described:
@@ -160,6 +174,8 @@ class GazeControllerNode(Node):
             self._command.publish(convert.joint_command(command.joints_rad, now_s))
         if command.track_request is not None:
             self._track_requests.publish(convert.track_request(command.track_request, self._images))
+        if command.object_request is not None:
+            self._object_requests.publish(convert.object_request(command.object_request, now_s))
         if self._state.get_subscription_count():
             self._state.publish(convert.gaze_state(report, now_s))
         if math.isfinite(report.fixation_m[0]) and self._fixation.get_subscription_count():
