@@ -215,3 +215,34 @@ def test_real_pairs(number, tmp_path, capsys):
     pair = [str(DATA / f"{eye}0{number}.jpg") for eye in ("left", "right")]
     assert main(["measure", *pair, "--out", str(tmp_path), "--json", "--windows", "50", "100"]) == 0
     check(json.loads(capsys.readouterr().out), tmp_path)
+
+
+def test_the_papers_table_has_the_shapes_both_directions_and_the_two_lists(pair, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["measure", *pair, "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert main(["measure", *pair, "--paper"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "images (401, 621, 3) (401, 621, 3), edges (401, 621) (401, 621)"
+    there, back = ([f"{value:.4f}" for value in figures[f"{way}_px"]] for way in ("left_to_right", "right_to_left"))
+    for i, size in enumerate(figures["windows_px"]):
+        rows = lines[1 + 3 * i : 4 + 3 * i]
+        assert rows[0] == f"{size}x{size}: shapes ({size}, {size}) ({size}, {size})"
+        assert rows[1:] == [f"  left to right {there[i]}", f"  right to left {back[i]}"]
+    assert lines[19:21] == [f"left to right: [{', '.join(there)}]", f"right to left: [{', '.join(back)}]"]
+    saved = {path.name for path in (tmp_path / "paper").iterdir()}
+    assert saved == {
+        *(f"{name}.png" for name in ("left", "right", "left_edges", "right_edges", "combined_edges", "boxes")),
+    }
+    taken, kept = cv2.imread(pair[0]), cv2.imread(str(tmp_path / "paper" / "left.png"))
+    assert kept is not None
+    assert taken is not None
+    assert np.array_equal(kept, taken)
+
+
+def test_the_papers_table_without_a_detector_says_so(pair, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert main(["measure", *pair, "--paper", "--out", str(tmp_path / "out")]) == 0
+    assert "no boxes: onnxruntime is not installed" in capsys.readouterr().out
+    assert not (tmp_path / "out" / "boxes.png").exists()
+    assert main(["measure", *pair, "--paper", "--json"]) == 2

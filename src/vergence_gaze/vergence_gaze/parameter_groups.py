@@ -17,7 +17,7 @@ from vergence_gaze.parameters import (
 )
 from vergence_gaze.target_parameters import TargetParameters
 from vergence_gaze.verged_parameters import VergedParameters
-from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError
+from vergence_rig.parameters import Groups, Parameters, replaced_groups
 
 _FIXED: Groups = (
     ("", GazeNodeParameters),
@@ -54,17 +54,4 @@ def gaze_parameters(values: Mapping[str, Any] = _NONE) -> GazeParameters:
 
     Raises ParameterError, with the full name, for an unknown name or an invalid value.
     """
-    groups = gaze_groups()
-    known = {prefix + spec.name for prefix, kind in groups for spec in kind.specs()}
-    for name, value in values.items():
-        if name not in known:
-            raise UnknownParameterError(name, value, known)
-    return collected(_group(prefix, kind, values) for prefix, kind in groups)
-
-
-def _group(prefix: str, kind: type[Parameters], values: Mapping[str, Any]) -> Parameters:
-    own = {spec.name: values[prefix + spec.name] for spec in kind.specs() if prefix + spec.name in values}
-    try:
-        return kind.from_mapping(own)
-    except ParameterError as error:
-        raise ParameterError(prefix + error.name, error.value, error.allowed) from None
+    return collected(replaced_groups(gaze_groups(), values))

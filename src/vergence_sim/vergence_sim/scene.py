@@ -25,6 +25,8 @@ STAND = "stand"
 """The body that carries rig_base, and does not turn with it."""
 CUBE_SIDE_M = 0.057
 MARKER_LENGTH_M, MARKER_RADIUS_M = 0.14, 0.010
+BOX_SIDES_M = (0.07, 0.09, 0.11)
+"""Depth, width and height of the textured box."""
 THIN_LENGTH_M = 0.24
 THIN_WIDTHS_M = {"straw": 0.006, "cable": 0.011, "stick": 0.020}
 """Upright round targets whose images are 5 to 15 px wide within reach, by name."""
@@ -52,7 +54,7 @@ class SceneBuilder(ModelBuilder):
         self._room.furnish()
 
     def targets(self) -> None:
-        """Add the Rubik's cube, the marker pen and an occluder: movable bodies."""
+        """Add the Rubik's cube, the marker pen, a textured box and an occluder: movable bodies."""
         half = CUBE_SIDE_M / 2
         cube = self._wrapped("cube", cube_faces(np.random.default_rng([self._seed, 2])))
         self.movable("cube", self.shape("box", (0, 0, 0), (half, half, half), cube, name="cube"))
@@ -66,6 +68,9 @@ class SceneBuilder(ModelBuilder):
                 "cylinder", (0, 0, 0.2 * length), (1.18 * radius, 0.02 * length), (0.9, 0.9, 0.88), name="marker_ring"
             ),
         )
+        covers = [book_cover(np.random.default_rng([self._seed, 12, face]), (256, 256)) for face in range(6)]
+        sides = (BOX_SIDES_M[0] / 2, BOX_SIDES_M[1] / 2, BOX_SIDES_M[2] / 2)
+        self.movable("box", self.shape("box", (0, 0, 0), sides, self._wrapped("box", covers), name="box"))
         board = [book_cover(np.random.default_rng([self._seed, 4, face]), (256, 256)) for face in range(6)]
         self.movable(
             "occluder",

@@ -88,6 +88,12 @@ _FRAMES = LaunchArgument(
     "auto",
     ("auto", "true", "false"),
 )
+_WEB = (
+    _switch("web", "run web_node, the page of the head for browsers, at http://localhost:8470", "false"),
+    LaunchArgument(
+        "web_address", "address that the page listens on; 0.0.0.0 for other machines, which need its token", "127.0.0.1"
+    ),
+)
 _RANGE = LaunchArgument(
     "discovery_range",
     "how far nodes are discovered; the other machine must be in it",
@@ -113,6 +119,7 @@ _CAMERAS_AND_VISION = (
     ),
     _ENCODER,
     _FRAMES,
+    *_WEB,
     _PROFILE,
 )
 
@@ -134,6 +141,7 @@ ARGUMENTS: dict[str, tuple[LaunchArgument, ...]] = {
         _ATTEND,
         _ENCODER,
         _FRAMES,
+        *_WEB,
         _switch(
             "use_sim_time",
             "simulated time: sim_node publishes /clock, which waits for the nodes that follow it",

@@ -24,7 +24,13 @@ from vergence_gaze.estimation.observations import (
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, ObjectRequest, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
-from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, resolve_goal
+from vergence_gaze.goals.goal_resolution import (
+    ClassRequest,
+    MotionRequest,
+    RequestedPose,
+    RequestedTarget,
+    resolve_goal,
+)
 from vergence_gaze.joints.feedback import FeedbackMonitor
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.joint_reports import in_eye_angles
@@ -114,6 +120,10 @@ class GazeController:
         """
         return point_in_rig(point_m, frame, stamp_s, self._perception.history, self._perception.kinematics)
 
+    def check(self, goal: Goal, now_s: float) -> None:
+        """Raise GoalError for a goal that cannot be started now; nothing changes."""
+        self._resolved(goal, now_s)
+
     def look_at(self, goal: Goal, now_s: float) -> int:
         """Start a goal and return its id; the active one ends as PREEMPTED.
 
@@ -121,10 +131,7 @@ class GazeController:
         """
         goal_id = self._goals.new_id()
         try:
-            if not self._enabled:
-                raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
-            kinematics, history = self._perception.kinematics, self._perception.history
-            request = resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
+            request = self._resolved(goal, now_s)
         except GoalError as error:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
@@ -143,6 +150,9 @@ class GazeController:
         elif isinstance(request, ClassRequest):
             tracking.request_class(request.class_name, goal_id)
             self._requests.ask_object(ObjectRequest(request.class_name))
+        elif isinstance(request, MotionRequest):
+            tracking.request_motion(goal_id)
+            self._requests.ask(TrackRequest(goal_id, motion=True))
         else:
             start = now_s, request.stamp_s, request.angles_rad, request.covariance, goal_id
             if goal.kind is GoalKind.POINT:
@@ -150,9 +160,15 @@ class GazeController:
             else:
                 tracking.request_target(*start)
                 xy = goal.left_xy if goal.left_eye else goal.right_xy
-                self._requests.ask(TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy))
+                self._requests.ask(TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy, goal.extent_rad))
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
+
+    def _resolved(self, goal: Goal, now_s: float) -> RequestedTarget | RequestedPose | ClassRequest | MotionRequest:
+        if not self._enabled:
+            raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
+        kinematics, history = self._perception.kinematics, self._perception.history
+        return resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
 
     def cancel(self, now_s: float, goal_id: int | None = None) -> bool:
         """End the active goal (or only if it is `goal_id`) as CANCELLED and hold still; False if there is none."""
@@ -391,10 +407,12 @@ class GazeController:
             eyes_still=self._perception.eyes_still(state.now_s, state.commanded_rad, self._law.lands_at_rest),
             travel_s=float((np.abs(residual) / state.speed_rad_s).max()),
             verged=self._perception.judge.verged,
-            # Without images there is nothing to be found in them; a stream of points needs none.
+            # Without images there is nothing to be found in them; a stream of points needs none. What moves is waited
+            # for: eyes that turn see less of it.
             may_search=tracking.follows_stream
             or (
                 not self._perception.images_missing(state.now_s)
+                and not tracking.awaits_motion
                 and (tracking.class_name is not None or lost_s > self._p.search.after_s)
                 and (self._attention.may_search or not self._attention.engaged)
             ),

@@ -61,11 +61,15 @@ class TargetTracking(TargetEstimator):
         self._start(RequestGate())
 
     def _start(
-        self, asked: RequestGate, point: RequestedPoint | None = None, by_class: RequestedClass | None = None
+        self,
+        asked: RequestGate,
+        point: RequestedPoint | None = None,
+        by_class: RequestedClass | None = None,
+        motion: bool = False,
     ) -> None:
         """Remove the target, and pass sightings through the gates of what is asked for from now on."""
         self.remove_target()
-        self.point, self._class, self._asked = point, by_class, asked
+        self.point, self._class, self._asked, self._motion = point, by_class, asked, motion
         self.object_id = 0
         """The detected object that is the target; 0 while none is."""
         self.ambiguity = ""
@@ -87,6 +91,11 @@ class TargetTracking(TargetEstimator):
     def class_name(self) -> str | None:
         """The requested class ("": any), None while no class is requested."""
         return self._asked.class_name
+
+    @property
+    def awaits_motion(self) -> bool:
+        """True while nothing has moved since it was asked for."""
+        return self._motion and not self.filter.initialised
 
     @property
     def follows_stream(self) -> bool:
@@ -123,6 +132,10 @@ class TargetTracking(TargetEstimator):
         return bool(
             known and box.usable and self._asked.class_name in ("", box.class_name) and not self._asked.object_id
         )
+
+    def request_motion(self, goal_id: int) -> None:
+        """Start with whatever moves next, as the tracker answers for this goal."""
+        self._start(RequestGate(goal_id), motion=True)
 
     def request_stream(self) -> None:
         """Start with the next point of the stream."""

@@ -76,8 +76,8 @@ def track_sighting(message: TargetTrack, left_image: EyeImage) -> TrackSighting:
 
 def track_request(request: TrackRequest, images: tuple[EyeImage, EyeImage]) -> TrackRequestMessage:
     """Return the request in raw pixels of the eye's image."""
-    message = TrackRequestMessage(goal_id=request.goal_id)
-    if request.goal_id:
+    message = TrackRequestMessage(goal_id=request.goal_id, motion=request.motion)
+    if request.goal_id and not request.motion:
         image = images[0 if request.left_eye else 1]
         message.header.stamp = to_stamp(request.stamp_s)
         message.eye = TrackRequestMessage.EYE_LEFT if request.left_eye else TrackRequestMessage.EYE_RIGHT
@@ -163,7 +163,7 @@ def camera_model(message: CameraInfo) -> CameraModel:
 
 
 def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: EyeImage, right: EyeImage) -> Goal:
-    """Return a LookAt goal; `point_m` is its point, already in rig_base. Raises ValueError for an unknown kind."""
+    """Return a LookAt goal; `point_m` is its point, already in rig_base. Raises ValueError for another kind or size."""
     stamp_s = to_seconds(request.header.stamp)
     left_xy = left.undistort([[request.left_x_px, request.left_y_px]])[0]
     right_xy = right.undistort([[request.right_x_px, request.right_y_px]])[0]
@@ -174,6 +174,7 @@ def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: EyeIma
         left_xy=(float(left_xy[0]), float(left_xy[1])),
         right_xy=(float(right_xy[0]), float(right_xy[1])),
         depth_m=request.depth_m if request.depth_m > 0 else math.nan,
+        extent_rad=_extent_rad(request, left if request.eye == LookAt.Goal.EYE_LEFT else right),
         version_rad=request.version_rad,
         vergence_rad=request.vergence_rad,
         tilt_rad=request.tilt_rad,
@@ -181,6 +182,16 @@ def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: EyeIma
         stamp_s=stamp_s if stamp_s > 0 else math.nan,
         time_limit_s=request.time_limit_s,
     )
+
+
+def _extent_rad(request: LookAt.Goal, image: EyeImage) -> tuple[float, float]:
+    """Return the angular size of a goal's object, NaN if unknown. Raises ValueError for one that no object has."""
+    size_px = request.width_px, request.height_px
+    if any(side < 0.0 or math.isinf(side) for side in size_px):
+        raise ValueError(f"width_px and height_px must be at least 0 and finite: got {size_px[0]:g} and {size_px[1]:g}")
+    if not all(side > 0.0 for side in size_px):
+        return math.nan, math.nan
+    return size_px[0] / image.fx_px, size_px[1] / image.fx_px
 
 
 def look_at_result(outcome: Outcome, report: GazeReport | None, stamp_s: float) -> LookAt.Result:

@@ -14,6 +14,7 @@ from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.tracking.eye_view import EyeView
+from vergence_metric.tracking.motion.awaited_motion import AwaitedMotion
 from vergence_metric.tracking.protocol import Tracker
 from vergence_metric.tracking.registry import make_tracker
 from vergence_metric.tracking.request import PairMemory, StoredPair, TrackRequest
@@ -39,6 +40,7 @@ class PairMeasurement:
         self._camera: CameraModel | None = None
         self._memory = PairMemory(parameters.tracker.memory_s)
         self._requests: deque[TrackRequest] = deque()
+        self._awaited_motion: AwaitedMotion | None = None
         self._ids_used = 0
         self._newest_id = 0
         self.unmet_request = ""
@@ -122,7 +124,15 @@ class PairMeasurement:
             EyeView(camera, pan_rad, eyes.tilt_rad, self._kinematics.pitch_rad)
             for pan_rad in (eyes.pan_left_rad, eyes.pan_right_rad)
         )
-        self._memory.add(StoredPair(stamp_s, edge.left_grey, edge.right_grey, (views[0], views[1])))
+        pair = StoredPair(stamp_s, edge.left_grey, edge.right_grey, (views[0], views[1]))
+        self._memory.add(pair)
+        if self._awaited_motion is not None:
+            found = self._awaited_motion.update(pair)
+            if isinstance(found, str):
+                waiting = Track.nowhere(self._newest_id, TrackStatus.LOST, f"waiting for something that moves: {found}")
+                return replace(waiting, goal_id=self._awaited_motion.goal_id)
+            self._awaited_motion = None
+            self._tracker.request(found, pair)
         track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes, samples)
         self._newest_id = self._ids_used + track.track_id
         return replace(track, track_id=self._newest_id)
@@ -130,6 +140,9 @@ class PairMeasurement:
     def _pass_on_requests(self, tracker: Tracker, edge: EdgeMetricResult) -> None:
         while self._requests:
             request, self.unmet_request = self._requests.popleft(), ""
+            self._awaited_motion = AwaitedMotion(request.goal_id) if request.motion else None
+            if request.motion:
+                continue
             if not request.goal_id:
                 tracker.lock_here()
                 continue
