@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from aiohttp import ClientSession, ClientWebSocketResponse, WSMsgType
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import CompressedImage, Image, JointState
 from std_msgs.msg import Header
@@ -118,6 +119,14 @@ def test_nothing_is_received_without_a_page(graph: Graph, web: WebNode) -> None:
     again = Page(graph, web)
     graph.wait_until(lambda: "/gaze/state" in subscribed(web), "a subscription of gaze/state")
     again.close()
+
+
+def test_a_page_that_comes_before_the_node_is_spun_is_served_too(graph: Graph) -> None:
+    node = WebNode(context=graph.context, parameter_overrides=[Parameter("port", value=0)])
+    page = Page(graph, node)
+    graph.add(node)
+    graph.wait_until(lambda: "/gaze/state" in subscribed(node), "a subscription of gaze/state")
+    page.close()
 
 
 def test_the_state_of_the_graph_is_shown(graph: Graph, page: Page) -> None:

@@ -353,7 +353,7 @@ class GazeController:
             self._command = np.array(rig.eye_angles(self._described.joint_angles(self._command.tolist())))
         self._described, self._rig = rig, rig.in_eye_angles()
         self._limits = CommandLimits(self._rig)
-        self._attention.configure(self._rig, self._p)
+        self._attention.set_rig(self._rig)
         self._perception.set_rig(self._rig)
         self._law = make_law(self._rig, self._p)
 
