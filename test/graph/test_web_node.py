@@ -303,6 +303,11 @@ def test_hold_and_centre_are_goals_of_angles(page: Page, controller: Controller)
     assert (centre.kind, centre.version_rad, centre.vergence_rad, centre.tilt_rad) == (LookAt.Goal.ANGLES, 0, 0, 0)
 
 
+def test_what_moves_is_a_goal_of_its_own(page: Page, controller: Controller) -> None:
+    page.ask(do="motion")
+    assert controller.goals[0].kind == LookAt.Goal.MOTION
+
+
 def test_what_is_not_served_is_said(page: Page) -> None:
     assert page.ask(do="park")["text"] == "nothing serves /servo_node/park: servo_node does"
     assert page.ask(do="hold")["text"] == "nothing serves /gaze/look_at: gaze_controller_node does"

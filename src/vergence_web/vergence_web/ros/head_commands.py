@@ -50,7 +50,7 @@ class HeadCommands:
         """Return whether what each command needs is there."""
         ready = {command: self._clients[name].service_is_ready() for command, (_, name, _) in _SERVICES.items()}
         goals = self._look_at.server_is_ready()
-        return {**ready, **dict.fromkeys(("look", "hold", "centre", "cancel"), goals)}
+        return {**ready, **dict.fromkeys(("look", "hold", "centre", "motion", "cancel"), goals)}
 
     def perform(self, message: Message, reply: Reply) -> None:
         """Do what a page asks for."""
@@ -92,6 +92,8 @@ class HeadCommands:
             setattr(goal, f"{eye}_y_px", request.y_px)
             goal.width_px, goal.height_px = request.width_px, request.height_px
             return goal
+        if request == Command("motion"):
+            return LookAt.Goal(kind=LookAt.Goal.MOTION)
         if request == Command("hold"):
             return LookAt.Goal(kind=LookAt.Goal.RELATIVE_ANGLES)
         return LookAt.Goal(kind=LookAt.Goal.ANGLES, vergence_rad=max(0.0, self._rig.minimum_vergence_rad))
