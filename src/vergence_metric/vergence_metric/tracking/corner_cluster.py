@@ -120,7 +120,11 @@ class CornerCluster:
         agree = self._fit(matched, hidden)
         if isinstance(agree, str):
             return agree
-        right = self._right_eye(pair, matched.known[agree], matched.px[agree])
+        if motion.saccading:
+            # The servos are not where they report: what the right eye sees says nothing of the distance.
+            right: _Right | str = _Right(reason="the eyes are in a saccade")
+        else:
+            right = self._right_eye(pair, matched.known[agree], matched.px[agree])
         if isinstance(right, str):
             return right
         return self._located(pair, matched, agree, right, hidden)
@@ -180,7 +184,9 @@ class CornerCluster:
         again = self._estimator.estimate(pair.left, pair.right, place, expected_px)
         if not again.ok:
             return _Right(reason=again.reason)
-        if abs(again.horizontal_px - expected_px) > jump_px:
+        few = len(known) < _SHARE_AGAIN * min(int(self.corners.established.sum()), _MOST)
+        # Joints of hobby servos shift what is expected; what covers a target shows hardly any of its corners.
+        if few and abs(again.horizontal_px - expected_px) > jump_px:
             return f"its disparity differs by {again.horizontal_px - expected_px:+.1f} px: occluded"
         self._depth.measured(pair, place, again.horizontal_px, again.vertical_px)
         return _Right(again.horizontal_px, again.vertical_px, again.sigma_px)
