@@ -12,6 +12,7 @@ found again by that (`remembered_patch.py`), whatever lies at the fovea. Until t
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,7 @@ from vergence_rig.kinematics import Kinematics
 _UNMISTAKABLE_SIMILARITY = 0.8
 
 
-class TargetTracker(LockingTracker[Target]):
+class TargetTracker(LockingTracker):
     """Follows one target by its appearance; see `LockingTracker`."""
 
     def __init__(
@@ -53,7 +54,7 @@ class TargetTracker(LockingTracker[Target]):
         self._segmenter = Segmenter(parameters, estimator, kinematics.baseline_m)
         super().__init__(parameters, camera, kinematics)
 
-    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Target:
+    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Any:
         return requested_target(self._track_id, request, pair, self._estimator, self._parameters)
 
     def _lock(self, pair: StoredPair) -> Track:
