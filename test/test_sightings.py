@@ -3,7 +3,7 @@
 from dataclasses import astuple
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from std_msgs.msg import Header
 
@@ -29,6 +29,7 @@ def edge() -> EdgeMetricResult:
     return EdgeMetric().measure(view, view)
 
 
+@settings(deadline=None)
 @given(
     status=st.sampled_from([one for one in TrackStatus if one is not TrackStatus.UNUSABLE_IMAGES]),
     x=st.floats(0, 639),

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.system
 
 Result = TypeVar("Result")
 
-STARTED_S, VERGED_S = 120.0, 120.0
+STARTED_S, VERGED_S = 180.0, 120.0
 PHONE = (390, 844)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vergence import Head
@@ -82,6 +82,7 @@ def test_the_same_parameters_give_the_same_figures_and_others_others(recording: 
 finite = st.floats(allow_nan=True, allow_infinity=False, width=64)
 
 
+@settings(deadline=None)
 @given(
     values=st.lists(finite, min_size=2, max_size=2),
     disparity_px=finite,

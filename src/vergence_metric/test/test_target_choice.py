@@ -93,6 +93,15 @@ def test_an_id_is_never_given_to_another_person_while_both_are_seen(seed, amplit
     assert not set(first) & set(second)
 
 
+def test_two_boxes_of_one_object_that_are_not_paired_are_one_object():
+    chooser = Chooser()
+    left, right = boxes_at(300)
+    first = chooser.see((left, right), 0.0).target.object_id
+    lower = box(right[0].center_px[0], 240 + 2 * P.max_vertical_px)  # too far from the epipolar line
+    chooser.see((left, [lower]), 0.1)
+    assert [one.object_id for one in chooser.objects] == [first]
+
+
 def test_an_id_outlasts_a_gap_and_no_longer():
     chooser = Chooser()
     first = chooser.see(boxes_at(300), 0.0).target.object_id

@@ -31,6 +31,7 @@ def gaze_state(**changes: Any) -> Any:
         "reason": "no goal yet",
         "law": "predictive",
         "mode": "both_eyes",
+        "attention": "disabled",
         "verged": False,
         "target_moving": False,
         "target": SimpleNamespace(x=NAN, y=NAN, z=NAN),
@@ -101,7 +102,18 @@ def test_a_metric_of_many_windows_is_bounded() -> None:
 
 
 def detection(left: float) -> Any:
-    return SimpleNamespace(class_name="cube", score=NAN, x_min_px=left, y_min_px=1.0, x_max_px=9.0, y_max_px=8.0)
+    return SimpleNamespace(
+        class_name="face",
+        score=NAN,
+        x_min_px=left,
+        y_min_px=1.0,
+        x_max_px=9.0,
+        y_max_px=8.0,
+        point_x_px=4.0,
+        point_y_px=NAN,
+        landmarks_x_px=[3.0, 5.0],
+        landmarks_y_px=[2.0, 2.5],
+    )
 
 
 def test_boxes_carry_the_stamp_of_their_image() -> None:
@@ -110,7 +122,15 @@ def test_boxes_carry_the_stamp_of_their_image() -> None:
     built = PageState(default_rig()).build({"vergence/detections": Newest(message, 0.1)})["detections"]
     assert built == {
         "stamp": "1795825253000000005",
-        "left": [{"class": "cube", "score": None, "xyxy": [2.0, 1.0, 9.0, 8.0]}],
+        "left": [
+            {
+                "class": "face",
+                "score": None,
+                "xyxy": [2.0, 1.0, 9.0, 8.0],
+                "point": [4.0, None],
+                "landmarks": [[3.0, 2.0], [5.0, 2.5]],
+            }
+        ],
         "right": [],
     }
 
@@ -167,6 +187,7 @@ def test_marks_follow_the_camera_and_its_mount() -> None:
 
 def test_an_uncalibrated_camera_is_scaled_from_the_rig() -> None:
     marks = EyeMarks(default_rig())
+    assert marks.marks([])[0]["fovea"] == [319.5, 239.5]
     for left in (True, False):
         marks.set_camera(left, None, 320, 240)
     assert marks.marks([])[0]["fovea"] == [159.5, 119.5]

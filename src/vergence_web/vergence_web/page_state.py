@@ -21,7 +21,7 @@ STALE_S = 1.5
 """A message that is older is no longer shown as the present."""
 _CHI2_95_PERCENT_OF_TWO = 5.991
 _LONGEST_TEXT = 300
-_MOST_BOXES, _MOST_WINDOWS = 50, 20
+_MOST_BOXES, _MOST_WINDOWS, _MOST_LANDMARKS = 50, 20, 10
 _DIGITS = 5
 
 
@@ -143,6 +143,7 @@ def _gaze(state: Any) -> dict[str, Any]:
         "reason": text(state.reason),
         "law": text(state.law),
         "mode": text(state.mode),
+        "attention": text(state.attention),
         "verged": bool(state.verged),
         "moving": bool(state.target_moving),
         **{name: figure(getattr(state, name)) for name in names.split()},
@@ -190,7 +191,12 @@ def _track(track: Any) -> dict[str, Any]:
 
 
 def _box_state(box: Any) -> dict[str, Any]:
-    return {"class": text(box.class_name), "status": int(box.status), "reason": text(box.reason)}
+    return {
+        "class": text(box.class_name),
+        "status": int(box.status),
+        "reason": text(box.reason),
+        "choice": text(box.choice_reason),
+    }
 
 
 def _detections(message: Any) -> dict[str, Any]:
@@ -204,4 +210,11 @@ def _detections(message: Any) -> dict[str, Any]:
 
 def _box(box: Any) -> dict[str, Any]:
     sides = (box.x_min_px, box.y_min_px, box.x_max_px, box.y_max_px)
-    return {"class": text(box.class_name), "score": figure(box.score, 2), "xyxy": [figure(side, 1) for side in sides]}
+    landmarks = list(zip(box.landmarks_x_px, box.landmarks_y_px, strict=False))[:_MOST_LANDMARKS]
+    return {
+        "class": text(box.class_name),
+        "score": figure(box.score, 2),
+        "xyxy": [figure(side, 1) for side in sides],
+        "point": [figure(box.point_x_px, 1), figure(box.point_y_px, 1)],
+        "landmarks": [[figure(x, 1), figure(y, 1)] for x, y in landmarks],
+    }

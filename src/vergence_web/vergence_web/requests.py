@@ -16,7 +16,7 @@ _LONGEST_TEXT, _LONGEST_NAME = 4096, 256
 _LARGEST_PX = 1e5
 _LONGEST_LIST = 1024
 
-COMMANDS = ("stop", "hold", "centre", "park", "enable", "disable", "cancel")
+COMMANDS = ("stop", "hold", "centre", "motion", "park", "enable", "disable", "cancel")
 """What a button asks for, without values."""
 
 

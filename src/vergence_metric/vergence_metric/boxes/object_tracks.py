@@ -154,9 +154,15 @@ class ObjectTracks:
             pixels = track.pixels(stamp_s, geometry)
             for j, one in enumerate(seen):
                 costs[i, j] = self._cost(track, one, pixels, stamp_s)
-        owner = {j: self._tracks[i] for i, j in _assignment(costs)}
+        assigned = _assignment(costs)
+        owner = {j: self._tracks[i] for i, j in assigned}
         objects = []
         for j, one in enumerate(seen):
+            # One object's two boxes that could not be paired are not two objects.
+            halves = [i for i, k in assigned if _are_halves(one.boxes, seen[k].boxes) and math.isfinite(costs[i, j])]
+            if j not in owner and halves:
+                self._tracks[halves[0]].update(one, stamp_s, geometry, self.parameters.gate_px)
+                continue
             track = owner.get(j) or self._new(one.boxes.shown.class_id)
             track.update(one, stamp_s, geometry, self.parameters.gate_px)
             objects.append(_object(track, one))
@@ -220,6 +226,11 @@ def _assignment(costs: Array) -> list[tuple[int, int]]:
     new[np.diag_indices(columns)] = 0.5 * _MAX_COST
     whole = np.block([[costs, alone], [new, np.zeros((columns, rows))]])
     return [(i, j) for i, j in optimal_assignment(whole) if i < rows and j < columns]
+
+
+def _are_halves(one: ObjectBoxes, other: ObjectBoxes) -> bool:
+    """Return whether one object is seen by the left eye alone and the other by the right one."""
+    return one.pair is None and other.pair is None and (one.left is None) != (other.left is None)
 
 
 def _object(track: _ObjectTrack, seen: ObjectMeasures) -> SeenObject:

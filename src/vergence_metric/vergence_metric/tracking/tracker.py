@@ -97,6 +97,8 @@ class TargetTracker(LockingTracker):
                 return in_left_eye(target, sighting, "the eyes are in a saccade")
             return track_requested(target, target.depths, sighting, pair, self._estimator, p.place_spread_px)
         fixated = target.fixated_px(sighting.pixel)
+        if not is_inside(fixated, left):
+            fixated = sighting.pixel
         expected_px = target.expected_disparity(fixated, views)
         disparity = self._estimator.estimate(left, right, fixated, expected_px)
         if not disparity.ok and fixated != sighting.pixel:

@@ -20,7 +20,7 @@ export class Control {
 
   /** Send a goal; `clickedAt` is the time stamp of the event that asked for it. */
   look(request, clickedAt = performance.now()) {
-    const what = request.do === "class" ? request.name : request.width ? "what is in the box" : `pixel ${request.x.toFixed(0)}, ${request.y.toFixed(0)} of the ${request.eye} eye`;
+    const what = request.do === "class" ? request.name : request.do === "motion" ? "what moves" : request.width ? "what is in the box" : `pixel ${request.x.toFixed(0)}, ${request.y.toFixed(0)} of the ${request.eye} eye`;
     this.ask(request, `look at ${what}`, clickedAt);
   }
 

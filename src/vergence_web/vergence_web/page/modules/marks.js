@@ -54,6 +54,10 @@ function drawBox(context, box, at) {
   const [left, top] = at([box.xyxy[0], box.xyxy[1]]);
   const [right, bottom] = at([box.xyxy[2], box.xyxy[3]]);
   outlined(context, () => context.rect(left, top, right - left, bottom - top), "#7be07b", 1.5);
+  for (const landmark of box.landmarks) {
+    if (landmark.includes(null)) continue;
+    outlined(context, () => context.arc(...at(landmark), 1.5, 0, 2 * Math.PI), "#7be07b", 1);
+  }
   label(context, `${box.class} ${box.score === null ? "" : box.score.toFixed(2)}`, left, top - 4);
 }
 

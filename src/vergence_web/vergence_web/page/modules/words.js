@@ -35,7 +35,8 @@ export class Words {
       ["Metric", best !== null && `${shown(edge.left_to_right_px[best], 2)} and ${shown(edge.right_to_left_px[best], 2)} px in ${edge.windows_px[best]} px, contrast ${shown(edge.contrast[best], 2)}`],
       ["Disparity", error && (error.reason || `${shown(error.horizontal_px, 2)} ± ${shown(error.sigma_px, 2)} px, ${shown(100 * error.confidence, 0)} % sure`)],
       ["Target", track && (track.reason || `followed, ${shown(track.disparity_px, 2)} px, ${shown(100 * track.confidence, 0)} % alike`)],
-      ["Boxes", box && (box.reason || box.class || "none")],
+      ["Boxes", box && [box.reason || box.class || "none", box.choice].filter(Boolean).join("; ")],
+      ["Attention", gaze && gaze.attention],
       ["Control", gaze && `${gaze.law}, ${gaze.mode.replaceAll("_", " ")}`],
     ];
     for (const [name, text] of rows) this.figure(name, text || "–");
@@ -63,11 +64,14 @@ export class Words {
     if (key === this.offered) return;
     this.offered = key;
     const buttons = seen.map((one, i) => make("button", { "data-detected": one.class, onclick: () => this.choose(i) }, one.of > 1 ? `${one.class} ${one.number}` : one.class));
+    const motion = make("button", { "data-motion": "", title: "Whatever moves next in the left image", onclick: () => this.onLook({ do: "motion" }) }, "what moves");
     const finds = (this.classes ?? []).map((name) => make("button", { "data-class": name, title: "Wherever it is", onclick: () => this.onLook({ do: "class", name }) }, name));
     const label = (text) => make("span", { class: "label" }, text);
     find("detected").replaceChildren(
       ...(buttons.length ? [label("Detected:"), ...buttons] : []),
-      ...(finds.length ? [label("Look for:"), ...finds] : []),
+      label("Look for:"),
+      ...finds,
+      motion,
     );
   }
 
@@ -77,8 +81,9 @@ export class Words {
     const one = seen[i];
     if (!one) return;
     const [left, top, right, bottom] = one.xyxy;
+    const [x, y] = one.point.includes(null) ? [(left + right) / 2, (top + bottom) / 2] : one.point;
     if (one.of === 1) this.onLook({ do: "class", name: one.class });
-    else this.onLook({ do: "pixel", eye: one.eye, stamp, x: (left + right) / 2, y: (top + bottom) / 2, width: Math.max(right - left, 1), height: Math.max(bottom - top, 1) });
+    else this.onLook({ do: "pixel", eye: one.eye, stamp, x, y, width: Math.max(right - left, 1), height: Math.max(bottom - top, 1) });
   }
 }
 
