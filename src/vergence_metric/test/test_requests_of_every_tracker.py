@@ -91,6 +91,21 @@ def test_a_target_with_too_few_corners_is_followed_by_its_appearance(monkeypatch
     assert np.abs(stage.errors[-1][:2]).max() < 2.5
 
 
+def test_a_target_that_leaves_the_image_is_lost_and_found_when_it_comes_back(stage):
+    stage.show(PLACE, gaze(PLACE))
+    ask(stage, gaze(PLACE))
+    start = gaze(PLACE)
+    for k in range(16):
+        turned = EyeAngles(start.pan_left_rad + 0.05 * k, start.pan_right_rad + 0.05 * k, start.tilt_rad)
+        track = stage.show(PLACE, turned)
+        assert track.status is TrackStatus.LOST or 0.0 <= track.left_px[0] <= 639.0
+    assert track.status is TrackStatus.LOST
+    for _ in range(4):
+        track = stage.show(PLACE, start)
+    assert track.status is TrackStatus.OK, track.reason
+    assert np.abs(stage.errors[-1][:2]).max() < tolerance_px(stage)
+
+
 def test_a_new_request_replaces_the_old_one(stage):
     stage.show(PLACE, gaze(PLACE))
     ask(stage, gaze(PLACE))

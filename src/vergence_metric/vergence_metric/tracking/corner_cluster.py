@@ -120,6 +120,9 @@ class CornerCluster:
         agree = self._fit(matched, hidden)
         if isinstance(agree, str):
             return agree
+        origin = self._cameras[0].origin_px
+        if not is_inside((origin[0], origin[1]), pair.left):
+            return "its corners put it outside the left image"
         if motion.saccading:
             # The servos are not where they report: what the right eye sees says nothing of the distance.
             right: _Right | str = _Right(reason="the eyes are in a saccade")

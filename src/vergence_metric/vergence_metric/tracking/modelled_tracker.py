@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from vergence_metric.disparity.protocol import DisparityEstimator
 from vergence_metric.tracking.eye_view import Pixel
-from vergence_metric.tracking.locking_tracker import LockingTracker, fovea_of
+from vergence_metric.tracking.locking_tracker import LockingTracker, fovea_of, is_inside
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.requested_target import pixel_in_left_eye
@@ -89,7 +89,8 @@ class ModelledTracker(LockingTracker):
 
     def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Any:
         point = request.pixel if request.left_eye else pixel_in_left_eye(request.pixel, pair, self._estimator)
-        model = self._learn(pair, point, request.extent_px)
+        inside = is_inside(point, pair.left)
+        model = self._learn(pair, point, request.extent_px) if inside else "it lies outside the left image"
         return Followed(self._track_id, pair.stamp_s, request.goal_id, model, pair.stamp_s)
 
     def _lock(self, pair: StoredPair) -> Track:
