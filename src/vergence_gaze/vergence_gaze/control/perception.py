@@ -1,6 +1,9 @@
 """The controller's state estimate: observations in; joints, target and `verged` out. It commands nothing."""
 
 import math
+from collections.abc import Callable
+from copy import copy
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -123,11 +126,12 @@ class Perception:
         """Return the target at `time_s`, or None."""
         return self.tracking.estimate(time_s)
 
-    def position(self, estimate: TargetEstimate | None) -> TargetPosition:
-        """Return where the target is, with its uncertainty."""
+    def position(self, estimate: TargetEstimate | None) -> Callable[[], TargetPosition]:
+        """Return a function that returns where the target is as of now, with its uncertainty."""
         if estimate is None:
-            return UNKNOWN
-        return target_position(estimate, self.kinematics, self._shaft_variances, self.vergence_offset)
+            return lambda: UNKNOWN
+        offset = copy(self.vergence_offset)
+        return partial(target_position, estimate, self.kinematics, self._shaft_variances, offset)
 
     def unseen_s(self, now_s: float) -> float:
         """Return for how long images arrived that did not show the target; inf before the first that did.
