@@ -69,9 +69,14 @@ class QosWatch:
         )
 
     def create_subscription(
-        self, message_type: Any, topic: str, callback: Callable[[Any], None], qos: QoSProfile = STATE_QOS
+        self,
+        message_type: Any,
+        topic: str,
+        callback: Callable[[Any], None],
+        qos: QoSProfile = STATE_QOS,
+        raw: bool = False,
     ) -> Subscription:
-        """As Node.create_subscription, overridable and watched."""
+        """As Node.create_subscription, overridable and watched; with `raw` messages are passed as they were sent."""
 
         def mismatch(event: QoSRequestedIncompatibleQoSInfo) -> None:
             what = "a publisher offers less than the subscriber requests"
@@ -84,6 +89,7 @@ class QosWatch:
             copy(qos),
             qos_overriding_options=overridable(),
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=mismatch),
+            raw=raw,
         )
 
     def report(self) -> Report:

@@ -83,6 +83,7 @@ class Simulator:
             if render
             else {}
         )
+        self._projected: dict[str, tuple[Image, Image]] = {}
         self._yaw_rad = 0.0
         start = self.parameters.target
         self._places: dict[str, Array] = {
@@ -165,9 +166,18 @@ class Simulator:
 
         def image() -> Image:
             blurred = motion_blurred(view, motion_px) if parameters.camera.exposure_s > 0 else view
-            return self._sensors[eye].apply(self.lenses[eye].apply(blurred), parameters)
+            projected = self._through_lens(eye, blurred)
+            taken = self._sensors[eye].apply(projected, parameters)
+            return taken.copy() if taken is projected else taken
 
         return image
+
+    def _through_lens(self, eye: str, view: Image) -> Image:
+        """Return a view through the lens; the same array again for the view before, as long as nothing moves."""
+        before = self._projected.get(eye)
+        if before is None or before[0] is not view:
+            before = self._projected[eye] = view, self.lenses[eye].apply(view)
+        return before[1]
 
     def capture(self, skew_s: float | None = None) -> StereoFrame:
         """Return the next pair, the first of the two exposed now, with the truth at the left exposure.

@@ -88,6 +88,11 @@ class GazeController:
         return pulse_steps_rad(self._described)
 
     @property
+    def uses_images(self) -> bool:
+        """True while the eyes are turned by what the images show, False while they hold still or go to an angle."""
+        return self._active and self._pose is None
+
+    @property
     def goal_id(self) -> int | None:
         """The active goal, None if there is none."""
         return self._goals.goal_id
@@ -120,7 +125,7 @@ class GazeController:
         self._goals.end(Result.PREEMPTED, "preempted by a newer goal", now_s)
         self._goals.start(goal_id, goal, now_s, self._p)
         self._feedback.retry()
-        self._active, self._pose, self._verges_on_sight = True, None, False
+        self._activate(now_s)
         self._perception.judge.restart()
         self._law.reset()
         self._searcher.stop()
@@ -163,7 +168,8 @@ class GazeController:
             self._hold("disabled: the eyes hold still, no commands are sent", now_s)
             self._send_until_s = -math.inf
         elif not self._active:
-            self._active = self._verges_on_sight = True
+            self._activate(now_s)
+            self._verges_on_sight = True
             self._perception.tracking.clear()
             self._requests.free()
 
@@ -171,15 +177,8 @@ class GazeController:
         """Update by what arrived since the last cycle and return what to command now.
 
         `joint_fault` says why no usable joint_states arrive, as whoever reads them reports it; empty while they do.
-        If the clock runs back by more than a second, the eyes hold still and everything starts again.
         """
-        if now_s < self._command_s - _CLOCK_JUMP_S:
-            self._perception.on_clock_reset()
-            self._feedback.clear()
-            self._command_s = now_s
-            self._restart("the clock was set back", self._p, now_s)
-        for observation in observations:
-            self._observe(observation, now_s)
+        self.observe(observations, now_s)
         sending = self._enabled and (self._active or now_s < self._send_until_s)
         last_sent, history = (self._command if sending else None), self._perception.history
         if not math.isfinite(now_s):
@@ -189,8 +188,7 @@ class GazeController:
         if not history.known:
             return Command(None, self._report(now_s), self._goals.pop_outcomes())
         if self._command is None or not sending:
-            # While idle, others may move the joints: start from where they are.
-            self._command, self._command_s = self._limits.nearest(self._perception.history.reported_rad), now_s
+            self._start_from_joints(now_s)
         desired = self._decide(now_s, self._command) if self._active else self._rest
         sent = self._limits.limited(
             desired, self._command, now_s - self._command_s, self._perception.history.reported_rad
@@ -203,6 +201,29 @@ class GazeController:
             self._update_goal(now_s)
         joints_rad = np.array(self._described.joint_angles(sent.tolist())) if sending else None
         return Command(joints_rad, self._report(now_s), self._goals.pop_outcomes(), self._requests.pop())
+
+    def rests(self, now_s: float) -> bool:
+        """Return whether a step would command nothing and end no goal: `observe` is then enough in most cycles."""
+        return not (self._active or now_s < self._send_until_s or self._goals.has_outcomes)
+
+    def observe(self, observations: Iterable[Observation], now_s: float) -> None:
+        """Update by what has arrived, as `step` does.
+
+        If the clock runs back by more than a second, the eyes hold still and everything starts again.
+        """
+        if now_s < self._command_s - _CLOCK_JUMP_S:
+            self._perception.on_clock_reset()
+            self._feedback.clear()
+            self._command_s = now_s
+            self._restart("the clock was set back", self._p, now_s)
+        for observation in observations:
+            self._observe(observation, now_s)
+        if self._perception.history.known and self.rests(now_s):
+            self._start_from_joints(now_s)
+
+    def _start_from_joints(self, now_s: float) -> None:
+        """Start the next command from where the joints are: while none is sent, others may move them."""
+        self._command, self._command_s = self._limits.nearest(self._perception.history.reported_rad), now_s
 
     def _observe(self, observation: Observation, now_s: float) -> None:
         if isinstance(observation, JointResolution):
@@ -239,7 +260,7 @@ class GazeController:
             self._perception.tracking.request_stream()
             self._requests.free()
             self._perception.judge.restart("the target is a stream of points")
-            self._active, self._pose, self._verges_on_sight = True, None, False
+            self._activate(now_s)
 
     def _decide(self, now_s: float, command: Array) -> Array:
         """Return the desired joint angles (3,), NaN for joints that stay."""
@@ -358,6 +379,10 @@ class GazeController:
         self._configure(parameters)
         self._hold(reason, now_s)
 
+    def _activate(self, now_s: float) -> None:
+        self._active, self._pose, self._verges_on_sight = True, None, False
+        self._perception.expect_images(now_s)
+
     def _hold(self, reason: str, now_s: float) -> None:
         self._active, self._pose, self._verges_on_sight = False, None, False
         self._perception.tracking.clear()
@@ -372,7 +397,8 @@ class GazeController:
 
     def _report(self, now_s: float) -> GazeReport:
         law, mode = self._law.name, self._p.control.mode
-        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, self._fault(now_s))
+        fault = self._fault(now_s)
+        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, fault, self.uses_images)
 
 
 def _driven(parameters: GazeParameters) -> npt.NDArray[np.bool_]:

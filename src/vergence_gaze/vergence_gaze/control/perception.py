@@ -82,6 +82,11 @@ class Perception:
         coarser = np.maximum(pulse_steps_rad(rig) - self._described_steps_rad, 0.0)
         self._unresolved_rad = 0.5 * float(coarser[0] + coarser[1])
 
+    def expect_images(self, now_s: float) -> None:
+        """Begin to wait for results of images, where none have arrived for so long that they would be missing."""
+        if self.images_missing(now_s):
+            self.image_s, self.exposure_s = now_s, math.nan
+
     def on_clock_reset(self) -> None:
         """Forget everything that has a stamp: the clock was set back."""
         self.history.clear()

@@ -25,7 +25,7 @@ class GazeReport:
     """Angles are estimated, residuals (version, vergence, tilt) are what is left to turn; NaN where unknown.
 
     `fault` says what is wrong with the joints' feedback or the images, `images_missing` whether no results of images
-    arrive. Where the target and the fixation point are is computed when it is read: most cycles' reports have no reader.
+    arrive. Where target and fixation point are is computed when it is read: most cycles' reports have no reader.
     """
 
     stamp_s: float
@@ -91,13 +91,17 @@ def make_report(
     mode: str,
     rig: Rig,
     fault: str = "",
+    uses_images: bool = True,
 ) -> GazeReport:
-    """Return the state at `now_s` under this law and mode; `fault` is that of the feedback or the images."""
+    """Return the state at `now_s` under this law and mode; `fault` is that of the feedback or the images.
+
+    `uses_images` says whether results of images are needed now.
+    """
     known = perception.history.known and math.isfinite(now_s)
     joints = perception.history.shaft_rad if known else np.full(3, math.nan)
     estimate = perception.tracking.estimate(now_s) if known else None
     residual = residual_of(estimate, joints)
-    images_missing = perception.images_missing(now_s)
+    images_missing = uses_images and perception.images_missing(now_s)
     reason = phases.reason if known else f"waiting: {fault}"
     if fault not in reason:
         reason = f"{reason}; {fault}"

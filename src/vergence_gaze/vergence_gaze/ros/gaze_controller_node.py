@@ -1,6 +1,7 @@
 """gaze_controller_node: turns the eyes by the metric nodes' measurements, and serves gaze/look_at."""
 
 import math
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from sensor_msgs.msg import CameraInfo, JointState
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
+from vergence_common.camera_infos import subscribe_camera_info
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.joint_states import JointStateInput
 from vergence_common.node_main import run_node
@@ -26,15 +28,8 @@ from vergence_gaze.parameters import GazeNodeParameters, GazeParameters
 from vergence_gaze.ros import gaze_messages as convert
 from vergence_gaze.ros.look_at_server import LookAtServer
 from vergence_gaze.ros.point_frames import PointFrames
-from vergence_msgs.msg import (
-    BoxVergence,
-    DetectorClasses,
-    EdgeVergence,
-    EyeRotation,
-    GazeState,
-    TargetTrack,
-    TrackRequest,
-)
+from vergence_gaze.ros.vision_input import VisionInput
+from vergence_msgs.msg import DetectorClasses, GazeState, TrackRequest
 from vergence_rig.camera import CameraModel, CameraModelError
 from vergence_rig.eye_image import described_camera, eye_images
 from vergence_rig.kinematics import Kinematics
@@ -42,6 +37,7 @@ from vergence_rig.rig_file import load_rig
 
 _FEEDBACK_EVERY = 10
 _MARKERS_EVERY = 10
+_RESTING_EVERY = 10  # cycles, while nothing is commanded and nothing reads the reports
 
 
 class GazeControllerNode(Node):
@@ -57,7 +53,6 @@ class GazeControllerNode(Node):
         self._images = eye_images(self._rig, (self._cameras[0], self._cameras[1]))
         self._controller = GazeController(self._rig, _parameters(settings), 1.0 / values.control_rate_hz)
         settings.on_change(self._on_parameters)
-        self._described: dict[bool, tuple[object, ...]] = {}
         self._arrived: list[Observation] = []
         self._newest: GazeReport | None = None
         self._cycles = 0
@@ -66,28 +61,25 @@ class GazeControllerNode(Node):
 
         diagnostics = Diagnostics(self)
         diagnostics.add("gaze", self._report)
-        self._reads_edges = False
-        self._watch = watch = watch_qos(self, diagnostics)
-        self._command = watch.create_publisher(JointState, "joint_command")
+        watch = watch_qos(self, diagnostics)
+        self._command, self._to_command = watch.create_publisher(JointState, "joint_command"), convert.JointCommand()
         self._track_requests = watch.create_publisher(TrackRequest, "vergence/track_request")
-        self._state = watch.create_publisher(GazeState, "gaze/state")
-        self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point")
-        self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1))
+        read = self._update_readers
+        self._read = (False, False, False)
+        self._state = watch.create_publisher(GazeState, "gaze/state", matched=read)
+        self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point", matched=read)
+        self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1), matched=read)
         self._joint_input = JointStateInput(self, diagnostics, watch, lambda j: self._add(convert.joint_report(j)))
         # Latched: one message per start of the servos' driver.
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         watch.create_subscription(
             JointState, "servo_node/resolution", lambda m: self._add(convert.joint_resolution(m)), latched
         )
-        watch.create_subscription(TargetTrack, "vergence/track", self._on_track)
-        watch.create_subscription(
-            BoxVergence, "vergence/box", lambda m: self._add(convert.box_sighting(m, self._images[0].fx_px))
-        )
-        watch.create_subscription(EyeRotation, "vergence/eye_rotation", lambda m: self._add(convert.eye_rotation(m)))
+        self._vision = VisionInput(self, watch, self._add, lambda: self._images[0])
         watch.create_subscription(DetectorClasses, "vergence/detector_classes", self._on_classes, latched)
         watch.create_subscription(PointStamped, "gaze/target", self._on_target)
-        watch.create_subscription(CameraInfo, "left/camera_info", lambda m: self._on_camera(m, left=True))
-        watch.create_subscription(CameraInfo, "right/camera_info", lambda m: self._on_camera(m, left=False))
+        subscribe_camera_info(watch, "left/camera_info", lambda m: self._on_camera(m, left=True))
+        subscribe_camera_info(watch, "right/camera_info", lambda m: self._on_camera(m, left=False))
         self.create_service(SetBool, "~/enable", self._on_enable)
         self.create_service(Trigger, "~/stop", self._on_stop)
         self._timer = self.create_timer(1.0 / values.control_rate_hz, self._cycle)
@@ -103,18 +95,6 @@ class GazeControllerNode(Node):
     def _add(self, observation: Observation) -> None:
         self._arrived.append(observation)
 
-    def _on_track(self, message: TargetTrack) -> None:
-        if message.contrast_window_px:
-            self._add(convert.track_contrast(message))
-        elif not self._reads_edges and message.status != TargetTrack.STATUS_UNUSABLE_IMAGES:
-            # Another tracker says nothing of contrast: vergence/edge does, and costs both sides more.
-            self._reads_edges = True
-            self._watch.create_subscription(EdgeVergence, "vergence/edge", self._on_edge)
-        self._add(convert.track_sighting(message, self._images[0]))
-
-    def _on_edge(self, message: EdgeVergence) -> None:
-        self._add(convert.edge_contrast(message))
-
     def _on_classes(self, message: DetectorClasses) -> None:
         self._look_at.classes = tuple(message.names)
 
@@ -128,10 +108,6 @@ class GazeControllerNode(Node):
         self._add(PointSighting(stamp_s, place, math.nan))
 
     def _on_camera(self, message: CameraInfo, left: bool) -> None:
-        described = (message.width, message.height, message.distortion_model, tuple(message.k), tuple(message.d))
-        if self._described.get(left) == described:
-            return  # it comes with every image
-        self._described[left] = described
         model: CameraModel | None
         try:
             model = convert.camera_model(message)
@@ -144,29 +120,37 @@ class GazeControllerNode(Node):
             self._cameras[0 if left else 1] = model
             self._images = self._look_at.images = eye_images(self._rig, (self._cameras[0], self._cameras[1]))
 
+    def _update_readers(self, _: object = None) -> None:
+        """Record which reports have subscribers: to ask in every cycle would cost as much as publishing."""
+        self._read = tuple(p.get_subscription_count() > 0 for p in (self._state, self._fixation, self._markers))
+
     def _cycle(self) -> None:
         now_s = self._now_s()
-        self._look_at.forward_cancels(now_s)
         arrived, self._arrived = self._arrived, []
+        self._cycles += 1
+        if self._controller.rests(now_s) and self._cycles % _RESTING_EVERY and not any(self._read):
+            self._controller.observe(arrived, now_s)
+            return
+        self._look_at.forward_cancels(now_s)
+        self._vision.update(self._controller.uses_images, monotonic())
         command = self._controller.step(now_s, arrived, self._joint_input.problem())
         self._newest = command.report
-        self._cycles += 1
         self._look_at.on_cycle(command)
         self._publish(command, now_s)
 
     def _publish(self, command: Command, now_s: float) -> None:
-        report = command.report
+        report, (state_read, fixation_read, markers_read) = command.report, self._read
         if command.joints_rad is not None:
-            self._command.publish(convert.joint_command(command.joints_rad, now_s))
+            self._command.publish(self._to_command(command.joints_rad, now_s))
         if command.track_request is not None:
             self._track_requests.publish(convert.track_request(command.track_request, self._images))
-        if self._state.get_subscription_count():
+        if state_read:
             self._state.publish(convert.gaze_state(report, now_s))
-        if math.isfinite(report.fixation_m[0]) and self._fixation.get_subscription_count():
+        if fixation_read and math.isfinite(report.fixation_m[0]):
             self._fixation.publish(convert.point_stamped(report.fixation_m, report.stamp_s))
         if self._cycles % _FEEDBACK_EVERY == 0:
             self._look_at.publish_feedback(report)
-        if self._cycles % _MARKERS_EVERY == 0 and self._markers.get_subscription_count():
+        if markers_read and self._cycles % _MARKERS_EVERY == 0:
             half = 0.5 * report.vergence_rad
             angles = np.array([report.version_rad - half, report.version_rad + half, report.tilt_rad])
             if np.isfinite(angles).all():
@@ -186,6 +170,7 @@ class GazeControllerNode(Node):
         self._controller.set_parameters(_parameters(settings), self._now_s())
 
     def _report(self) -> Report:
+        self._update_readers()  # not every middleware reports matches
         report, encoder = self._newest, self._controller.vergence_offset
         if report is None:
             return Report(WARN, "no control cycle yet")

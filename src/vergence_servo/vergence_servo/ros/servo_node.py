@@ -42,6 +42,8 @@ from vergence_servo.servo_head import Mode, ServoHead
 from vergence_servo.servo_reports import CommandCounts, channel_report, commands_report, head_report
 from vergence_servo.trajectory import Trajectory, check_end, start_delay_s
 
+_LEAST_STEPS_HZ = 20.0  # that time-outs and the heartbeat need while nothing moves
+
 COMMAND_TOPICS = ("joint_command", "~/commands", "joint_trajectory")
 
 
@@ -126,9 +128,16 @@ class ServoNode(Node):
         )
         # Servos are real also beside simulated time: their time-outs must not stand with /clock.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0 / values.update_rate_hz, self._step, clock=steady)
+        self._updates = self.create_timer(1.0 / values.update_rate_hz, self._update, clock=steady)
+        self._state_rate_hz = values.state_rate_hz
         self.create_timer(1.0 / values.state_rate_hz, self._publish_state, clock=steady)
         self.create_timer(1.0, self._check_commanders, clock=steady)
+
+    def _update(self) -> None:
+        self._step()
+        # Time-outs and the guardian's heartbeat go on with every report.
+        if not self._head.moving and self._state_rate_hz >= _LEAST_STEPS_HZ:
+            self._updates.cancel()
 
     def _step(self) -> None:
         now_s = time.monotonic()
@@ -178,6 +187,11 @@ class ServoNode(Node):
             return
         self._counts.accept(topic, now_s)
         self._head.step(now_s)
+        self._resume_updates()
+
+    def _resume_updates(self) -> None:
+        if self._updates.is_canceled():
+            self._updates.reset()
 
     def _check_stamp(self, message: JointState) -> None:
         self._stamps.check(to_nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds)
@@ -190,12 +204,15 @@ class ServoNode(Node):
     def _on_trigger(self, act: Callable[[float], None], response: Trigger.Response) -> Trigger.Response:
         try:
             act(time.monotonic())
+            self._resume_updates()
             response.success, response.message = True, self._head.mode.value
         except CommandRefusedError as error:
             response.success, response.message = False, str(error)
         return response
 
     def _publish_state(self) -> None:
+        if self._updates.is_canceled():
+            self._step()
         now_s = time.monotonic()
         positions = self._head.positions_rad(now_s)
         before_s, before = self._reported_rad
