@@ -37,7 +37,7 @@ from vergence_rig.rig_file import load_rig
 
 _FEEDBACK_EVERY = 10
 _MARKERS_EVERY = 10
-_RESTING_EVERY = 10  # cycles, while nothing is commanded and nothing reads the reports
+_RESTING_PERIOD_S = 0.1  # of cycles, while nothing is commanded and nothing reads the reports
 
 
 class GazeControllerNode(Node):
@@ -57,7 +57,7 @@ class GazeControllerNode(Node):
         self._newest: GazeReport | None = None
         self._cycles = 0
         self._frames = PointFrames(self, self._controller)
-        self._look_at = LookAtServer(self, self._controller, self._frames, self._images)
+        self._look_at = LookAtServer(self, self._controller, self._frames, self._images, self._end_rest)
 
         diagnostics = Diagnostics(self)
         diagnostics.add("gaze", self._report)
@@ -82,7 +82,8 @@ class GazeControllerNode(Node):
         subscribe_camera_info(watch, "right/camera_info", lambda m: self._on_camera(m, left=False))
         self.create_service(SetBool, "~/enable", self._on_enable)
         self.create_service(Trigger, "~/stop", self._on_stop)
-        self._timer = self.create_timer(1.0 / values.control_rate_hz, self._cycle)
+        self._period_s, self._resting = 1.0 / values.control_rate_hz, False
+        self._timer = self.create_timer(self._period_s, self._cycle)
 
     @property
     def resolution_rad(self) -> list[float]:
@@ -99,6 +100,7 @@ class GazeControllerNode(Node):
         self._look_at.classes = tuple(message.names)
 
     def _on_target(self, message: PointStamped) -> None:
+        self._end_rest()
         stamp_s = to_seconds(message.header.stamp) or self._now_s()
         try:
             place = self._frames.in_rig(message.point, message.header.frame_id, stamp_s)
@@ -123,14 +125,28 @@ class GazeControllerNode(Node):
     def _update_readers(self, _: object = None) -> None:
         """Record which reports have subscribers: to ask in every cycle would cost as much as publishing."""
         self._read = tuple(p.get_subscription_count() > 0 for p in (self._state, self._fixation, self._markers))
+        if any(self._read):
+            self._end_rest()
+
+    def _end_rest(self) -> None:
+        """Go on at the full rate, with what has arrived: something is requested or read."""
+        if not self._resting:
+            return
+        self._resting = False
+        self._timer.timer_period_ns = round(1e9 * self._period_s)
+        self._timer.reset()
+        arrived, self._arrived = self._arrived, []
+        self._controller.observe(arrived, self._now_s())
 
     def _cycle(self) -> None:
         now_s = self._now_s()
         arrived, self._arrived = self._arrived, []
         self._cycles += 1
-        if self._controller.rests(now_s) and self._cycles % _RESTING_EVERY and not any(self._read):
-            self._controller.observe(arrived, now_s)
-            return
+        if not self._controller.rests(now_s) or any(self._read):
+            self._end_rest()
+        elif not self._resting:
+            self._resting = True
+            self._timer.timer_period_ns = round(1e9 * max(self._period_s, _RESTING_PERIOD_S))
         self._look_at.forward_cancels(now_s)
         self._vision.update(self._controller.uses_images, monotonic())
         command = self._controller.step(now_s, arrived, self._joint_input.problem())
@@ -157,11 +173,13 @@ class GazeControllerNode(Node):
                 self._markers.publish(convert.gaze_markers(angles, report.fixation_m, self._kinematics, now_s))
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        self._end_rest()
         self._controller.enable(request.data, self._now_s())
         response.success, response.message = True, "enabled" if request.data else "disabled: the eyes hold still"
         return response
 
     def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._end_rest()
         self._controller.stop(self._now_s())
         response.success, response.message = True, "stopped: the eyes hold still"
         return response

@@ -1,6 +1,7 @@
 """The action gaze/look_at: each goal runs in the controller until the control cycle reports its outcome."""
 
 import math
+from collections.abc import Callable
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
@@ -24,8 +25,14 @@ class LookAtServer:
     """
 
     def __init__(
-        self, node: Node, controller: GazeController, frames: PointFrames, images: tuple[EyeImage, EyeImage]
+        self,
+        node: Node,
+        controller: GazeController,
+        frames: PointFrames,
+        images: tuple[EyeImage, EyeImage],
+        on_goal: Callable[[], None],
     ) -> None:
+        self._on_goal = on_goal
         self.images = images
         self.classes: tuple[str, ...] | None = None
         self._node, self._controller, self._frames = node, controller, frames
@@ -64,6 +71,7 @@ class LookAtServer:
 
     def _on_accepted(self, handle: ServerGoalHandle) -> None:
         # The goal is executed once it has ended: rclpy's events executor calls a coroutine that awaits without pause.
+        self._on_goal()
         now_s, request = self._now_s(), handle.request
         try:
             stamp_s = to_seconds(request.header.stamp) or math.nan
