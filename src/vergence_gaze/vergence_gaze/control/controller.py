@@ -187,11 +187,12 @@ class GazeController:
         self._goals.update_feedback(fault, now_s, self._p)
         if not history.known:
             return Command(None, self._report(now_s), self._goals.pop_outcomes())
-        if self._command is None or not sending:
-            self._start_from_joints(now_s)
-        desired = self._decide(now_s, self._command) if self._active else self._rest
+        command = self._command
+        if command is None or not sending:
+            command = self._start_from_joints(now_s)
+        desired = self._decide(now_s, command) if self._active else self._rest
         sent = self._limits.limited(
-            desired, self._command, now_s - self._command_s, self._perception.history.reported_rad
+            desired, command, now_s - self._command_s, self._perception.history.reported_rad
         )
         self._note_limits(desired)
         self._command, self._command_s = sent, max(now_s, self._command_s)
@@ -221,9 +222,11 @@ class GazeController:
         if self._perception.history.known and self.rests(now_s):
             self._start_from_joints(now_s)
 
-    def _start_from_joints(self, now_s: float) -> None:
-        """Start the next command from where the joints are: while none is sent, others may move them."""
-        self._command, self._command_s = self._limits.nearest(self._perception.history.reported_rad), now_s
+    def _start_from_joints(self, now_s: float) -> Array:
+        """Start the next command from where the joints are (3,): while none is sent, others may move them."""
+        self._command = command = self._limits.nearest(self._perception.history.reported_rad)
+        self._command_s = now_s
+        return command
 
     def _observe(self, observation: Observation, now_s: float) -> None:
         if isinstance(observation, JointResolution):
