@@ -47,8 +47,13 @@ def test_a_metric_node_names_the_camera_and_goes_on(graph: Any, kind: Any) -> No
 
 def test_the_controller_keeps_its_cameras(graph: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     node = graph.start(GazeControllerNode)
-    before, received, receive = node._cameras[0], [], node._on_camera
-    monkeypatch.setattr(node, "_on_camera", lambda m, left: (receive(m, left), received.append(list(m.d))))
+    before, received, receive = node._cameras[0], list[list[float]](), node._on_camera
+
+    def on_camera(message: CameraInfo, left: bool) -> None:
+        receive(message, left)
+        received.append(list(message.d))
+
+    monkeypatch.setattr(node, "_on_camera", on_camera)
     publisher = graph.client.create_publisher(CameraInfo, "left/camera_info", 10)
     graph.wait_until(publisher.get_subscription_count, "the node to subscribe")
     for focal, d in HOSTILE:

@@ -16,7 +16,7 @@ from vergence_sim.motion import offset_m
 from vergence_sim.optics import Lens, Sensor, motion_blurred
 from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.renderer import EyeRenderer
-from vergence_sim.scene import OBJECTS, STAND, build_scene
+from vergence_sim.scene import OBJECTS, STAND, build_scene, release_textures
 from vergence_sim.truth import GroundTruth, TrueBox, Truth
 
 Array = npt.NDArray[np.float64]
@@ -51,6 +51,7 @@ class Simulator:
         rig: Rig | None = None,
         render: bool = True,
         head: Rig | None = None,
+        alone: bool = False,
     ) -> None:
         """Make the head and its room.
 
@@ -59,6 +60,7 @@ class Simulator:
             rig: that a driver and the other nodes are given; the built-in one if none.
             render: False for no images.
             head: the head that is simulated, as a rig of its own; the parameters' if none.
+            alone: True if this process makes no other simulator: memory that others would share is freed.
         """
         self.parameters = (parameters or SimParameters()).effective()
         simulation, self.rig = self.parameters.simulation, rig or default_rig()
@@ -74,6 +76,8 @@ class Simulator:
         self._truth = GroundTruth(self._model, self._data, self.lenses, built)
         sizes_px = {eye: (camera.width_px, camera.height_px) for eye, camera in cameras.items()}
         self._renderer = EyeRenderer(self._model, sizes_px) if render else None
+        if render and alone:
+            release_textures(self._model)
         seeds = np.random.SeedSequence(simulation.seed).spawn(2)
         self._sensors = (
             {

@@ -191,9 +191,7 @@ class GazeController:
         if command is None or not sending:
             command = self._start_from_joints(now_s)
         desired = self._decide(now_s, command) if self._active else self._rest
-        sent = self._limits.limited(
-            desired, command, now_s - self._command_s, self._perception.history.reported_rad
-        )
+        sent = self._limits.limited(desired, command, now_s - self._command_s, self._perception.history.reported_rad)
         self._note_limits(desired)
         self._command, self._command_s = sent, max(now_s, self._command_s)
         if sending:
