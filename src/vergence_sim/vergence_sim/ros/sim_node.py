@@ -11,8 +11,8 @@ from vergence_common.parameters import ParameterSet
 from vergence_msgs.msg import TrueBoxes, TrueVergence
 from vergence_rig.rig_file import load_rig
 from vergence_sim.parameters import GROUPS, NODE_GROUPS, SimParameters
-from vergence_sim.ros.world_node import WorldNode
 from vergence_sim.ros.sim_messages import true_boxes, true_vergence
+from vergence_sim.ros.world_node import WorldNode
 from vergence_sim.simulator import Simulator
 from vergence_sim.world import EYES
 
