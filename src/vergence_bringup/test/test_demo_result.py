@@ -135,7 +135,7 @@ def test_report_carries_its_pictures_and_plots(result, boxes, tmp_path):
             cv2.imwrite(str(pictures / f"cube_{moment}_{kind}"), np.zeros((8, 8, 3), np.uint8))
     write_report(tmp_path / "report.html", [dataclasses.replace(result, end_box=boxes)], SETTINGS, tmp_path)
     text = (tmp_path / "report.html").read_text()
-    assert text.count("data:image/") == 10
+    assert text.count("data:image/") == 11  # the overview and each picture
     assert text.count("<svg") == 3
     assert text.count("<polyline") >= 8
     assert "end, left &minus; right [px]</td><td>-</td><td>+2.00</td><td>+12.00</td>" in text
