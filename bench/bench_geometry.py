@@ -83,7 +83,13 @@ def identified_rows(outcomes: Sequence[GeometryOutcome], suffix: str) -> list[Ro
     off = np.abs(stated[:, 0] / true - 1.0)
     inside = (stated[:, 1] <= true) & (true <= stated[:, 2])
     return [
-        Row(f"geometry.aside_deg.identified{suffix}", _median([o.aside_deg for o in verged]), "deg"),
+        Row(
+            f"geometry.aside_deg.identified{suffix}",
+            _median([o.aside_deg for o in verged]),
+            "deg",
+            "least that one tilt allows",
+            _median([o.least_deg for o in verged]),
+        ),
         Row(f"geometry.distance_error.identified{suffix}", _median(off.tolist()), "of the distance"),
         Row(f"geometry.distance_interval.identified{suffix}", _mean(inside.tolist()), "share inside"),
         _share(f"geometry.verged.identified{suffix}", outcomes, [o.on_target for o in outcomes]),

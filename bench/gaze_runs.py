@@ -16,7 +16,7 @@ from vergence_gaze.estimation.observations import BoxSighting, EyeRotationObserv
 from vergence_gaze.goals.goal import Goal, GoalKind
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.phases import Phase
-from vergence_gaze.testing.fake_head import TICK_S, FakeHead, VisionModel
+from vergence_gaze.testing.fake_head import TARGET_ID, TICK_S, FakeHead, VisionModel
 from vergence_rig.camera import CameraModel
 from vergence_rig.eye_image import eye_images
 from vergence_rig.rig import Rig, default_rig
@@ -179,8 +179,8 @@ class SimulatedHead(FakeHead):
         pixel = self._simulator.lenses[eye].distorted(self._simulator.project(eye, point_m))
         return np.asarray(self._images[not left].undistort(pixel))[0]
 
-    def true_errors_rad(self) -> Array:
-        """Return (version, vergence, tilt) to the target minus the true ones (3,), by the simulator."""
+    def true_errors_rad(self, object_id: int = TARGET_ID) -> Array:
+        """Return (version, vergence, tilt) to the target, the one object there is, minus the true ones (3,)."""
         self._pose()
         vergence, version, tilt = self._simulator.errors_to(self.target(self.time_s))
         return np.array([version, vergence, tilt])

@@ -18,7 +18,8 @@ from bench.heads import joints_of
 from bench.photos_lockstep import Lockstep, record
 from bench.photos_scenes import PointOfRoom, settle
 from bench.photos_trials import AWAKE_S
-from vergence_rig.eye_image import EyeImage
+from vergence_rig.camera import CameraModel
+from vergence_rig.eye_image import EyeImage, eye_images
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import CameraSpec, Rig, default_rig
 from vergence_rig.servo import IDEAL
@@ -59,9 +60,10 @@ class GeometryTrial:
 class GeometryOutcome:
     """What came of a click, at its end: angles in degrees, distances in metres.
 
-    `aside_deg` is the larger of the angles between the target point and each eye's fovea. `seen_deg` is how far from
-    the foveas that the graph was given the target appears to it: sideways in either eye, and up or down unless it lies
-    above the one and below the other, as it does for cameras that are pitched apart.
+    `aside_deg` is the larger of the angles between the target point and each eye's fovea. `least_deg` is what remains
+    of it with the best of joint angles: one tilt turns both eyes, and their lenses are not level. `seen_deg` is how far
+    from the foveas that the graph was given the target appears to it: sideways in either eye, and up or down unless it
+    lies above the one and below the other, as it does for cameras that are pitched apart.
     """
 
     trial: GeometryTrial
@@ -73,6 +75,7 @@ class GeometryOutcome:
     seen_deg: float
     stated_m: tuple[float, float, float]
     reason: str
+    least_deg: float = 0.0
 
     @property
     def on_target(self) -> bool:
@@ -172,7 +175,18 @@ def run(trial: GeometryTrial) -> GeometryOutcome:
             watch.seen_deg[-1],
             watch.stated_m,
             trace.reason[-1],
+            _least_deg(simulator, head, point_m),
         )
+
+
+def _least_deg(simulator: Simulator, head: Rig, point_m: Array) -> float:
+    """Return half of how much higher a point (3,) [m] lies in one eye than in the other [deg]."""
+    images = eye_images(head, (CameraModel(head.left_camera), CameraModel(head.right_camera)))
+    left_y, right_y = (
+        math.degrees(math.atan(image.undistort(pixel_of(simulator, eye, point_m))[0][1]))
+        for eye, image in zip(EYES, images, strict=True)
+    )
+    return 0.5 * abs(left_y - right_y)
 
 
 def pixel_of(simulator: Simulator, eye: str, point_m: Array) -> tuple[float, float]:

@@ -30,6 +30,7 @@ from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.pairs.ideal_images import IdealImages
 from vergence_metric.ros.track_messages import track_message, track_request
 from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import EyeAngles
 from vergence_rig.joint_history import JointHistory
 from vergence_rig.rig import JOINT_NAMES, CameraSpec, Rig
 from vergence_sim.real_time import Schedule
@@ -92,6 +93,10 @@ class MetricOfPairs:
         """Keep a joint report."""
         angles = self._rig.eye_angles([angles_rad[name] for name in JOINT_NAMES])
         self._joints.add(_ns(stamp_s), JOINT_NAMES, angles)
+
+    def eyes_at(self, left_stamp_s: float, right_stamp_s: float) -> EyeAngles | None:
+        """Return the reported eye angles at a pair's stamps, None if they are not known."""
+        return self._joints.at(_ns(left_stamp_s), _ns(right_stamp_s))
 
     def on_request(self, request: TrackRequest) -> None:
         """Pass the controller's request on to the tracker; it takes effect at the next pair, as in the node."""
@@ -169,7 +174,11 @@ class Lockstep:
             self._arrive(event.due_s + JOINT_REPORT_S, [JointReport(clock_s(event.due_s), dict(report))])
             return
         publish_s = event.due_s + world.parameters.camera.latency_s
-        self._schedule.publish(event.eye, publish_s, (event.due_s, world.expose(event.eye)))
+        self._schedule.publish(event.eye, publish_s, (event.due_s, self._expose(event.eye)))
+
+    def _expose(self, eye: str) -> Callable[[], Any]:
+        """Expose an eye now; the image is made when it is published."""
+        return self.world.expose(eye)
 
     def _publish(self, eye: str, exposed_s: float, develop: Callable[[], Image]) -> None:
         self._frames[eye].append((exposed_s, develop()))

@@ -1,12 +1,14 @@
 """`make soak`: a simulated head looks at a target that is moved every five seconds, for an hour or DURATION_S seconds.
 
-Memory, threads and descriptors of every node are sampled; what is left in shared memory is counted at the end.
+The duration is of the wall clock. The goals' periods are of simulated time, which waits for the nodes: whether a goal
+succeeds does not depend on what else the machine does. Memory, threads and descriptors of every node are sampled; what
+is left in shared memory is counted at the end.
 """
 
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from bench import results
 from bench.process_cost import rss_mb
@@ -28,10 +31,9 @@ from vergence_common.domains import own_domain
 from vergence_msgs.action import LookAt
 
 DURATION_S, PERIOD_S, SAMPLE_S = 3600.0, 5.0, 10.0
-NODES = ("sim_node", "edge_metric_node", "gaze_controller_node")
 _WARM_SHARE = 0.25  # of the duration: caches fill, and count for no slope
-_START_S = 60.0
-_WORLD: dict[str, Any] = {"head.model": "ideal"}
+_START_S, _STALLED_S = 60.0, 120.0
+_WORLD: dict[str, Any] = {"head.model": "ideal", "clock.stepped": False}
 _SHM = Path("/dev/shm")
 
 
@@ -69,7 +71,7 @@ class Goals:
     """Moves the target and looks at it, one goal after the other."""
 
     def __init__(self, context: Context) -> None:
-        self.node = Node("soak", context=context)
+        self.node = Node("soak", context=context, parameter_overrides=[Parameter("use_sim_time", value=True)])
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
         self._pose = self.node.create_publisher(PointStamped, "sim/target_pose", 10)
@@ -79,7 +81,11 @@ class Goals:
     def ready(self) -> bool:
         """Run callbacks; return whether the graph is there."""
         self._executor.spin_once(timeout_sec=0.2)
-        return self._client.server_is_ready() and self._pose.get_subscription_count() > 0
+        return self._client.server_is_ready() and self._pose.get_subscription_count() > 0 and self.now_s() > 0
+
+    def now_s(self) -> float:
+        """Return the simulated time [s], 0 before it is known."""
+        return float(self.node.get_clock().now().nanoseconds) * 1e-9
 
     def close(self) -> None:
         """Leave the graph."""
@@ -89,7 +95,7 @@ class Goals:
 
     def one(self) -> bool:
         """Look at a new place; return whether the eyes verged on it within the period."""
-        end_s = time.monotonic() + PERIOD_S
+        end_s = self.now_s() + PERIOD_S
         x, y, z = (float(v) for v in self._random.uniform((0.45, -0.12, -0.06), (0.9, 0.12, 0.06)))
         place = PointStamped()
         place.header.frame_id = "rig_base"
@@ -109,8 +115,11 @@ class Goals:
         return verged
 
     def _run(self, done: Callable[[], bool], end_s: float) -> None:
-        while not done() and time.monotonic() < end_s:
-            self._executor.spin_once(timeout_sec=min(0.2, max(end_s - time.monotonic(), 0.0)))
+        stalled_s = time.monotonic() + _STALLED_S
+        while not done() and self.now_s() < end_s:
+            self._executor.spin_once(timeout_sec=0.2)
+            if time.monotonic() > stalled_s:
+                raise RuntimeError(f"simulated time has not come to {end_s:.1f} s within {_STALLED_S:g} s")
 
 
 def segments(pid: int | str) -> set[Path]:
@@ -124,16 +133,16 @@ def run(duration_s: float) -> list[Row]:
     """Run the soak and return its rows."""
     mapped: set[Path] = set()
     with own_domain() as domain:
-        commands = simulated_head(config_dir() / "rig.yaml", **_WORLD)
+        commands = simulated_head(config_dir() / "rig.yaml", simulated_time=True, **_WORLD)
         with ProcessGroup(results.OUT_DIR / "soak_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes:
-            for name in NODES:
-                nodes.start(name, commands[name])
+            for name, command in commands.items():
+                nodes.start(name, command)
             os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
             context = Context()
             rclpy.init(args=[], context=context, domain_id=domain)
             goals = Goals(context)
-            samples, verged = _soak(goals, nodes, duration_s)
-            mapped = segments("self").union(*(segments(nodes.pid(name)) for name in NODES))
+            samples, verged = _soak(goals, nodes, {name: nodes.pid(name) for name in commands}, duration_s)
+            mapped = segments("self").union(*(segments(nodes.pid(name)) for name in commands))
             goals.close()
             context.try_shutdown()
     left = sum(path.exists() for path in mapped)
@@ -153,19 +162,23 @@ def run(duration_s: float) -> list[Row]:
     ]
 
 
-def _soak(goals: Goals, nodes: ProcessGroup, duration_s: float) -> tuple[dict[str, Samples], list[bool]]:
+def _soak(
+    goals: Goals, nodes: ProcessGroup, pids: Mapping[str, int], duration_s: float
+) -> tuple[dict[str, Samples], list[bool]]:
     started_s = time.monotonic()
     while not goals.ready():
         nodes.check()
         if time.monotonic() - started_s > _START_S:
             raise RuntimeError(f"the graph did not start within {_START_S:g} s")
-    samples = {name: Samples() for name in NODES}
+    samples = {name: Samples() for name in pids}
     verged: list[bool] = []
+    sampled_s = -SAMPLE_S
     for now_s in _periods(duration_s):
         nodes.check()
-        if now_s - (samples[NODES[0]].time_s or [-SAMPLE_S])[-1] >= SAMPLE_S:
-            for name, of_node in samples.items():
-                of_node.add(now_s, nodes.pid(name))
+        if now_s - sampled_s >= SAMPLE_S:
+            sampled_s = now_s
+            for name, pid in pids.items():
+                samples[name].add(now_s, pid)
         verged.append(goals.one())
         if len(verged) % 60 == 0:
             print(f"   {now_s:.0f} s: {sum(verged)} of {len(verged)} goals verged", flush=True)

@@ -9,21 +9,22 @@ from xml.etree import ElementTree
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = sorted((ROOT / "src").glob("vergence_*"))
+PACKAGES = sorted((ROOT / "src").glob("vergence*"))
 PYTHON_PACKAGES = [path for path in PACKAGES if (path / "setup.py").is_file()]
 ROSDEP_KEYS = {
+    "aiohttp": "python3-aiohttp",
     "cv2": "python3-opencv",
     "hypothesis": "python3-hypothesis",
     "numpy": "python3-numpy",
     "pytest": "python3-pytest",
     "yaml": "python3-yaml",
 }
-NOT_IN_APT = {"mujoco", "onnx", "onnxruntime"}
+NOT_IN_APT = {"mujoco", "onnx", "onnxruntime", "rosbags"}
 """pip packages: rosdep's keys of these fail where pip refuses to install into the system (PEP 668), so no package names
 them; the nodes that need one say how to install it."""
 OF_ONE_DRIVER = {"adafruit_pca9685", "board", "busio", "lgpio", "pigpio"}
 """Imported only where the servos of that driver are."""
-IF_INSTALLED = {"skimage"}
+IF_INSTALLED = {"control_msgs", "skimage"}
 """Imported only where it is installed, and not needed."""
 LAUNCHED = {path.name for path in PACKAGES} | {"robot_state_publisher"}
 """What vergence_bringup starts, whether it imports it or not."""

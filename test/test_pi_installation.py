@@ -30,7 +30,7 @@ def built() -> set[str]:
 
 def run(code: str) -> "subprocess.CompletedProcess[str]":
     """Run Python on what is like the Pi: only the packages that the page builds, and what their dependencies are."""
-    others = {path.name for path in (ROOT / "src").glob("vergence_*")} - built()
+    others = {path.name for path in (ROOT / "src").glob("vergence*")} - built()
     absent = sorted(others | {"cv2", "onnxruntime", "mujoco", "skimage", "scipy"})
     return subprocess.run(
         [sys.executable, "-c", WITHOUT.format(absent=absent) + code], capture_output=True, text=True, timeout=120

@@ -66,8 +66,8 @@ make_venv() {
     fi
   fi
   if [ -f "$ros_setup" ]; then
-    "$venv/bin/python" -c 'import cv2, numpy, yaml' 2>/dev/null ||
-      fail "ROS is here, but not what its packages need: apt install python3-numpy python3-opencv python3-yaml"
+    "$venv/bin/python" -c 'import aiohttp, cv2, numpy, yaml' 2>/dev/null ||
+      fail "ROS is here, but not what its packages need: apt install python3-aiohttp python3-numpy python3-opencv python3-yaml"
     install_packages run requirements/beside_apt.txt
   else
     install_packages ros requirements/ros.txt requirements/run.txt requirements/beside_apt.txt
@@ -111,7 +111,7 @@ build() {
     fail "the build failed: the whole output is in log/bootstrap.txt"
   fi
   printf '%s' "$sum" >"$stamp"
-  say "built: $(find install -maxdepth 1 -name 'vergence_*' | wc -l) packages"
+  say "built: $(find install -maxdepth 1 -name 'vergence*' | wc -l) packages"
 }
 
 make_venv

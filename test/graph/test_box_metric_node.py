@@ -18,12 +18,14 @@ from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_metric.boxes import DetectorError
 from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.ros.box_metric_node import BoxMetricNode
-from vergence_msgs.msg import BoxVergence, DetectorClasses, StereoDetections
+from vergence_msgs.msg import BoxVergence, DetectorClasses, ObjectRequest, StereoDetections
 from vergence_rig.parameters import RenamedParameterError
 from vergence_rig.rig import default_rig
 
-onnx = pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
-TensorProto, helper, numpy_helper = onnx.TensorProto, onnx.helper, onnx.numpy_helper
+pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
+
+from vergence_metric.testing.onnx_detectors import build_detector
+from vergence_metric.testing.onnx_grids import FACE_POINTS
 
 pytestmark = pytest.mark.graph
 
@@ -31,43 +33,6 @@ MS = 1_000_000
 START_NS = 1_700_000_000_000_000_000
 FOCAL_PX = 100.0
 WIDTH, HEIGHT, CELL = 128, 96, 16
-
-
-def red_square_detector(path: Path) -> Path:
-    """Write a one-class YOLOv6-like model: a cell of 16 px scores the mean of its red."""
-    y, x = np.mgrid[0 : HEIGHT // CELL, 0 : WIDTH // CELL]
-    count = x.size
-    # Strides 8, 16 and 32 as the family has them; only the cells of 16 px answer.
-    rows = [(HEIGHT // s) * (WIDTH // s) for s in (8, 32)]
-    place = np.zeros((1, rows[0] + count + rows[1], 5), np.float32)
-    place[0, :, :4], place[0, :, 4] = (20, 20, 8, 8), 1.0
-    place[0, rows[0] : rows[0] + count, :2] = (np.column_stack([x.ravel(), y.ravel()]) + 0.5) * CELL
-    place[0, rows[0] : rows[0] + count, 2:4] = CELL
-    constants = {
-        "red": np.array([0]),
-        "flat": np.array([1, -1, 1]),
-        "place": place,
-        "before": np.zeros((1, rows[0], 1), np.float32),
-        "after": np.zeros((1, rows[1], 1), np.float32),
-    }
-    nodes = [
-        helper.make_node("Gather", ["images", "red"], ["channel"], axis=1),
-        helper.make_node("AveragePool", ["channel"], ["pool"], kernel_shape=[CELL] * 2, strides=[CELL] * 2),
-        helper.make_node("Reshape", ["pool", "flat"], ["middle"]),
-        helper.make_node("Concat", ["before", "middle", "after"], ["scores"], axis=1),
-        helper.make_node("Concat", ["place", "scores"], ["outputs"], axis=2),
-    ]
-    graph = helper.make_graph(
-        nodes,
-        "red",
-        [helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, HEIGHT, WIDTH])],
-        [helper.make_tensor_value_info("outputs", TensorProto.FLOAT, None)],
-        [numpy_helper.from_array(value, name) for name, value in constants.items()],
-    )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
-    helper.set_model_props(model, {"names": '{"0": "square"}'})
-    onnx.save(model, str(path))
-    return path
 
 
 def scene(column: int) -> npt.NDArray[np.uint8]:
@@ -110,7 +75,7 @@ class Eyes:
 
 @pytest.fixture
 def model(tmp_path: Path) -> str:
-    return str(red_square_detector(tmp_path / "red.onnx"))
+    return str(build_detector(tmp_path / "red.onnx", "yolov6", (WIDTH, HEIGHT), 1, names='{"0": "square"}'))
 
 
 @pytest.fixture
@@ -131,7 +96,28 @@ def answer(graph: Any, node: BoxMetricNode, eyes: Eyes, left: Any, right: Any) -
 def test_the_classes_are_published_to_whoever_comes_later(graph: Any, node: BoxMetricNode) -> None:
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     future = graph.message(DetectorClasses, "vergence/detector_classes", qos=latched)
-    assert graph.wait(future).names == ["square"]
+    assert graph.wait(future).names == ["square", "motion"]
+
+
+def test_a_face_is_looked_at_between_its_eyes(graph: Any, tmp_path: Path) -> None:
+    path = build_detector(tmp_path / "yunet.onnx", "yunet", (WIDTH, HEIGHT))
+    node = graph.start(BoxMetricNode, **{"detector.model": str(path)})
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    assert "face" in graph.wait(graph.message(DetectorClasses, "vergence/detector_classes", qos=latched)).names
+    eyes = Eyes(graph)
+    eyes.describe()
+    graph.wait_until(lambda: all(node._stereo.models), "the cameras are known")
+    eyes.turn(START_NS + 100 * MS)
+    graph.wait_until(lambda: node._joints.known, "the joints are known")
+    message = answer(graph, node, eyes, scene(64), scene(48))
+    assert message.class_name == "face"
+    expected = np.array(FACE_POINTS) * CELL + [63.5, 15.5]
+    found = np.column_stack([message.left.landmarks_x_px, message.left.landmarks_y_px])
+    np.testing.assert_allclose(found, expected, atol=1e-3)
+    between = expected[:2].mean(0)
+    assert (message.left.point_x_px, message.left.point_y_px) == pytest.approx(tuple(between), abs=1e-3)
+    assert message.left_elevation_rad == pytest.approx(math.atan((between[1] - (HEIGHT - 1) / 2) / FOCAL_PX), abs=1e-5)
+    assert message.distance_low_m < message.distance_m < message.distance_high_m
 
 
 def test_a_pair_gives_metric_ii_with_the_left_stamp(graph: Any, node: BoxMetricNode) -> None:
@@ -177,6 +163,39 @@ def test_one_eye_blind_is_said_and_not_zero(graph: Any, node: BoxMetricNode) -> 
     assert math.isnan(message.sigma_px)
     assert math.isnan(message.right.x_min_px)
     assert message.left.x_min_px == 63.5
+
+
+def test_two_that_cross_keep_their_ids_and_the_requested_one_is_the_target(graph: Any, node: BoxMetricNode) -> None:
+    eyes = Eyes(graph)
+    graph.set_parameters(node, **{"motion.enable": False})
+
+    def both(first: int, second: int) -> BoxVergence:
+        """A darker square in the upper row and a brighter one below, which move past one another."""
+        views = [np.zeros((HEIGHT, WIDTH, 3), np.uint8) for _ in range(2)]
+        for view, shift in zip(views, (0, CELL), strict=True):
+            view[CELL : 2 * CELL, first - shift : first - shift + CELL, 2] = 200
+            view[3 * CELL : 4 * CELL, second - shift : second - shift + CELL, 2] = 255
+        return answer(graph, node, eyes, *views)
+
+    message = both(32, 80)
+    rows = {one.object_id: one for one in message.objects}
+    assert len(rows) == 2
+    target = message.object_id
+    (other,) = set(rows) - {target}
+    assert "of 2 objects" in message.choice_reason
+    for first in (48, 64, 80):
+        message = both(first, 112 - first)
+        assert message.object_id == target
+        assert {one.object_id for one in message.objects} == {target, other}
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    requests = graph.client.create_publisher(ObjectRequest, "vergence/object_request", latched)
+    requests.publish(ObjectRequest(class_name="square", object_id=other))
+    graph.wait_until(lambda: node._measurement._choice._requested.object_id == other, "the request has arrived")
+    before_px = message.left.y_min_px
+    message = both(80, 32)
+    assert message.object_id == other
+    assert message.left.y_min_px != before_px
+    assert message.choice_reason == f"object {other} is requested"
 
 
 def test_detections_and_picture_are_published_while_subscribed(graph: Any, node: BoxMetricNode) -> None:

@@ -20,6 +20,7 @@ from vergence_metric.ros.box_metric_node import BoxMetricNode
 from vergence_metric.ros.edge_metric_node import EdgeMetricNode
 from vergence_metric.ros.eye_rotation_node import EyeRotationNode
 from vergence_servo.ros.servo_node import ServoNode
+from vergence_web.ros.web_node import WebNode
 
 pytestmark = pytest.mark.graph
 
@@ -51,6 +52,7 @@ MADE: dict[str, Callable[[Path], tuple[Callable[..., Node], dict[str, Any]]]] = 
     "eye_rotation_node": _plain(EyeRotationNode),
     "gaze_controller_node": _plain(GazeControllerNode),
     "servo_node": _plain(ServoNode, backend="fake", guardian=False),
+    "web_node": _plain(WebNode, port=0),
 }
 
 

@@ -9,114 +9,25 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PointStamped
 from rclpy.action import ActionClient
-from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
-from vergence_common.stamps import to_stamp
-from vergence_gaze.estimation.observations import EdgeContrast, JointReport, TrackSighting
 from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
 from vergence_gaze.testing.fake_head import FakeHead
+from vergence_gaze.testing.ros.head_node import FOCAL_PX, HeadNode
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import DetectorClasses, EdgeVergence, GazeState, TargetTrack, TrackRequest
+from vergence_msgs.msg import DetectorClasses, GazeState
 from vergence_rig.rig import JOINT_NAMES, default_rig
 
 pytestmark = pytest.mark.graph
 
 WAIT_S = 100.0
-BEGIN_S = 1000.0
-TURN_TICKS = 3
-LONGEST_CYCLE_S = 0.045
-FOCAL_PX = 539.0
 ENDLESS_S = 600.0
-
-
-class HeadNode(Node):
-    """The fake head on the topics of sim_node and edge_metric_node, and the clock that everybody goes by.
-
-    Time goes on by 10 ms, but never further than the controller's cycle can have followed.
-    """
-
-    def __init__(self, head: FakeHead, context: Context) -> None:
-        super().__init__("head", context=context)
-        self.head = head
-        self._answered_s = 0.0
-        self.silent: set[str] = set()
-        """Of "joints" and "images", what is not published."""
-        self.images_fault = ""
-        """If set, why tracks say that the images are unusable."""
-        self._time = self.create_publisher(Clock, "/clock", 10)
-        self._joints = self.create_publisher(JointState, "joint_states", 10)
-        self._edge = self.create_publisher(EdgeVergence, "vergence/edge", 10)
-        self._track = self.create_publisher(TargetTrack, "vergence/track", 10)
-        self.commands: list[list[float]] = []
-        self.create_subscription(JointState, "joint_command", self._on_command, 10)
-        self.create_subscription(GazeState, "gaze/state", self._on_state, 10)
-        self.create_subscription(TrackRequest, "vergence/track_request", self._on_request, 10)
-        self.create_timer(0.001, self._turn)
-
-    @property
-    def now(self) -> Time:
-        """The present, as a stamp."""
-        return self._stamp(self.head.time_s)
-
-    def _on_command(self, message: JointState) -> None:
-        by_name = dict(zip(message.name, message.position, strict=True))
-        self.commands.append([by_name[name] for name in JOINT_NAMES])
-        self.head.command(np.array(self.commands[-1]))
-
-    def _on_request(self, message: TrackRequest) -> None:
-        self.head.track_for(message.goal_id)
-
-    def _on_state(self, message: GazeState) -> None:
-        self._answered_s = self.head.time_s
-
-    def _turn(self) -> None:
-        if self.head.time_s - self._answered_s < LONGEST_CYCLE_S:
-            for _ in range(TURN_TICKS):
-                for observation in self.head.advance():
-                    self._publish(observation)
-        # Again while waiting: whoever joins late has to hear what time it is.
-        self._time.publish(Clock(clock=self.now))
-
-    def _stamp(self, head_s: float) -> Time:
-        return to_stamp(BEGIN_S + head_s)
-
-    def _publish(self, seen: object) -> None:
-        if ("joints" if isinstance(seen, JointReport) else "images") in self.silent:
-            return
-        if isinstance(seen, JointReport):
-            message = JointState(name=list(seen.positions_rad), position=list(seen.positions_rad.values()))
-            message.header.stamp = self._stamp(seen.stamp_s)
-            self._joints.publish(message)
-        elif isinstance(seen, EdgeContrast):
-            edge = EdgeVergence(windows_px=[50, 300], contrast=[seen.contrast, 1.0])
-            edge.left_to_right_px = edge.right_to_left_px = [seen.metric_px, 9.0]
-            edge.header.stamp = self._stamp(seen.stamp_s)
-            self._edge.publish(edge)
-        elif isinstance(seen, TrackSighting):
-            track = TargetTrack(
-                pair_skew_s=seen.skew_s,
-                track_id=seen.track_id,
-                goal_id=seen.goal_id,
-                left_x_px=319.5 + FOCAL_PX * seen.left_x,
-                left_y_px=239.5 + FOCAL_PX * seen.left_y,
-                disparity_rad=seen.disparity_rad,
-                sigma_px=seen.sigma_rad * FOCAL_PX,
-                status=TargetTrack.STATUS_OK if seen.usable else TargetTrack.STATUS_LOST,
-            )
-            track.header.stamp = self._stamp(seen.stamp_s)
-            if self.images_fault:
-                track.status, track.reason = TargetTrack.STATUS_UNUSABLE_IMAGES, self.images_fault
-            self._track.publish(track)
 
 
 class Scene:
@@ -255,10 +166,19 @@ def test_a_class_that_the_detector_does_not_look_for_is_refused_at_once(scene: S
     result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cub", time_limit_s=ENDLESS_S)))
     assert result.result == LookAt.Result.INVALID
     assert result.reason == "class_name must be one that the detector looks for (cube, ball, cup): got 'cub'"
+    result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="face", time_limit_s=ENDLESS_S)))
+    assert result.result == LookAt.Result.INVALID
+    assert "got 'face'; faces need YuNet: the file face_detection_yunet_2023mar.onnx" in result.reason
     handle = scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cube", time_limit_s=ENDLESS_S))
     scene.until(lambda: scene.states[-1].phase == GazeState.PHASE_SEARCH, "the class is searched for")
     scene.cancel(handle)
     assert scene.result(handle).result == LookAt.Result.CANCELLED
+
+
+def test_a_face_that_nothing_detects_ends_with_what_is_missing(scene: Scene) -> None:
+    result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="face", time_limit_s=0.5)))
+    assert result.result in (LookAt.Result.TIMED_OUT, LookAt.Result.LOST)
+    assert "box_metric_node must run; faces need YuNet" in result.reason
 
 
 def test_angles_are_reached_exactly(scene: Scene) -> None:

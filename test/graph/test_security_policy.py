@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from vergence_bringup.node_table import NODES
-from vergence_bringup.ros.security_policy import CLOCK, EYES, OPERATOR, SOMETIMES, Endpoints
+from vergence_bringup.ros.security_policy import EYES, OPERATOR, Endpoints, with_sometimes
 from vergence_bringup.testing.ros.every_node import KINDS
 from vergence_bringup.testing.ros.live_policies import live_endpoints
 
@@ -29,6 +29,7 @@ def _allowed(executable: str, namespace: str) -> Endpoints:
         names("services", "service", "reply"),
         names("services", "service", "request"),
         names("actions", "action", "execute"),
+        names("actions", "action", "call"),
     )
 
 
@@ -44,11 +45,7 @@ def test_a_node_is_allowed_what_it_has(executable: str, domain_id: int, request:
         request.getfixturevalue("opengl")
     for namespace in [f"/{eye}" for eye in EYES] if executable == "camera_node" else ["/"]:
         live, allowed = live_endpoints(executable, namespace, domain_id), _allowed(executable, namespace)
-        publish, subscribe = SOMETIMES.get(executable, ((), ()))
-        hint = "run: python tools/write_security_policy.py"
-        assert allowed.publish == live.publish.union(publish), hint
-        assert allowed.subscribe == live.subscribe.union(subscribe, (CLOCK,)), hint
-        assert (allowed.reply, allowed.request, allowed.execute) == (live.reply, live.request, live.execute), hint
+        assert allowed == with_sometimes(executable, live), "run: python tools/write_security_policy.py"
 
 
 @pytest.mark.parametrize("topic", ["/joint_command", "/servo_node/commands", "/joint_trajectory"])

@@ -88,6 +88,17 @@ def test_a_command_that_cannot_be_is_refused_by_name_and_nothing_moves(
     assert list(joints.position) == [0.0, 0.0, 0.0]
 
 
+def test_persons_are_in_the_room_and_move(graph: Any) -> None:
+    try:
+        graph.start(SimNode, **{"persons.count": 2, "persons.motion": "cross", "target.z_m": -5.0, "preset": "ideal"})
+    except OSError as error:
+        pytest.skip(f"no OpenGL here: {error}")
+    boxes = graph.wait(graph.message(TrueBoxes, "ground_truth/boxes", lambda m: len(m.left) == 2))
+    assert [box.class_name for box in boxes.left] == ["person", "person"]
+    first_px = boxes.left[0].x_min_px
+    graph.wait(graph.message(TrueBoxes, "ground_truth/boxes", lambda m: abs(m.left[0].x_min_px - first_px) > 20.0))
+
+
 def test_a_target_goes_where_it_is_put(graph: Any, sim: SimNode) -> None:
     place = graph.client.create_publisher(PointStamped, "sim/target_pose", 10)
     graph.wait_until(place.get_subscription_count, "sim_node to listen")

@@ -1,5 +1,6 @@
 """`vergence doctor` tries what nodes need: what is broken fails with its reason, whatever the settings say."""
 
+import hashlib
 import os
 import shutil
 import subprocess
@@ -10,6 +11,8 @@ import pytest
 
 from vergence_bringup.commands.doctor_trials import rig_files, shared_memory
 from vergence_bringup.node_table import HOSTS, NODES
+from vergence_rig import face_model
+from vergence_rig.finding import Finding
 
 pytestmark = pytest.mark.system
 
@@ -101,6 +104,36 @@ def test_what_a_rig_names_is_opened(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "servos.yaml").write_text("servos: {tilt: {channel: 0}}\n")
-    failed = [finding for finding in rig_files(rig, servos, "kernel_pwm", model) if not finding.ok]
+    failed = [finding for finding in rig_files(rig, servos, "kernel_pwm", model) if not finding.ok and finding.needed]
     assert len(failed) == 1
     assert words in failed[0].message
+
+
+def faces(model: str) -> Finding:
+    """What is found of faces with a model."""
+    (finding,) = (one for one in rig_files("", "", "kernel_pwm", model) if one.name == "faces")
+    assert not finding.needed
+    return finding
+
+
+def test_a_missing_detector_of_faces_is_named(tmp_path: Path) -> None:
+    for model, words in (("", "the shipped detector detects none"), (str(tmp_path / "gone.onnx"), "No such file")):
+        finding = faces(model)
+        assert not finding.ok
+        assert words in finding.message
+        assert "face_detection_yunet_2023mar.onnx" in finding.message
+        assert "SHA-256 8f2383e4dd3cfbb4" in finding.remedy
+
+
+def test_a_detector_of_faces_is_told_by_its_class_and_the_zoo_s_by_its_sum(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
+    from vergence_metric.testing.onnx_detectors import build_detector
+
+    other = str(build_detector(tmp_path / "person.onnx", "yolov8", classes=80))
+    assert not faces(other).ok
+    built = build_detector(tmp_path / "yunet.onnx", "yunet")
+    assert "detects faces; it is not face_detection_yunet_2023mar.onnx" in faces(str(built)).message
+    monkeypatch.setattr(face_model, "FACE_MODEL_SHA256", hashlib.sha256(built.read_bytes()).hexdigest())
+    assert "is YuNet of the OpenCV Zoo" in faces(str(built)).message

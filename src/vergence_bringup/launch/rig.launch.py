@@ -1,7 +1,7 @@
 """A real head on one machine: two cameras, the metrics, the controller and the servos.
 
 ros2 launch vergence_bringup rig.launch.py left_device:=/dev/v4l/by-id/... right_device:=/dev/v4l/by-id/...
-    servos:=/home/me/servos.yaml [backend:=pca9685]
+    servos:=/home/me/servos.yaml [backend:=pca9685] [web:=true]
 Without servos the servos are simulated and nothing moves. With the servos on another machine use laptop.launch.py here
 and pi.launch.py there. detector:=true model:=/path/to/your.onnx adds metric II. composed:=true runs all nodes in one
 process.
@@ -44,6 +44,8 @@ def files(executable: str, values: Mapping[str, str]) -> list[str]:
 def settings(values: Mapping[str, str]) -> Settings:
     found: Settings = {f"{eye}_camera": ("camera_node", camera(eye, values)) for eye in EYES}
     chosen = {"edge_metric_node": {}, "gaze_controller_node": {}}
+    if values["attend"] == "true":
+        chosen["gaze_controller_node"] = {"start": "attend"}
     if values["detector"] == "true":
         chosen["box_metric_node"] = {"detector.model": values["model"]}
     if values["encoder"] == "true":
@@ -77,6 +79,8 @@ def build(values: Mapping[str, str]) -> list[Any]:
     else:
         nodes = [separate(name, *of_node, values) for name, of_node in found.items()]
     fakes = fakes_banner(values) if values["servo_node"] == "true" else ""
+    if values["web"] == "true":
+        nodes.append(node("web_node", parameters={"rig": values["rig"], "address": values["web_address"]}))
     return [*([LogInfo(msg=fakes)] if fakes else []), *head(values, *frames(values), *nodes)]
 
 

@@ -53,5 +53,5 @@ def test_pip_remedies_are_commands_that_this_python_accepts(monkeypatch, nothing
     monkeypatch.setattr("vergence_rig.install_hint.externally_managed", lambda: True)
     monkeypatch.setattr(sys, "prefix", sys.base_prefix)
     remedies = {finding.name: finding.remedy for finding in doctor.examine(render=False)}
-    for name, package in (("detector", "onnxruntime"), ("simulator", "mujoco")):
+    for name, package in (("detector", "onnxruntime"), ("simulator", "mujoco"), ("recordings", "rosbags")):
         assert f"pip install --user --break-system-packages {package}" in remedies[name]

@@ -121,7 +121,9 @@ def test_every_node_of_the_simulated_head_has_one_time(arguments, simulated):
         ("sim.launch.py", {}, {"sim_node", "edge_metric_node", "box_metric_node", "gaze_controller_node"}, set()),
         ("sim.launch.py", {"detector": "false"}, {"sim_node"}, {"box_metric_node"}),
         ("sim.launch.py", {"encoder": "false"}, {"sim_node"}, {"eye_rotation_node"}),
-        ("rig.launch.py", {}, {"camera_node", "servo_node"}, {"box_metric_node", "sim_node"}),
+        ("sim.launch.py", {"web": "true"}, {"sim_node", "web_node"}, set()),
+        ("rig.launch.py", {}, {"camera_node", "servo_node"}, {"box_metric_node", "sim_node", "web_node"}),
+        ("rig.launch.py", {"web": "true"}, {"camera_node", "servo_node", "web_node"}, set()),
         ("rig.launch.py", {"detector": "true", "servo_node": "false"}, {"box_metric_node"}, {"servo_node"}),
         ("laptop.launch.py", {}, {"camera_node", "gaze_controller_node", "eye_rotation_node"}, {"servo_node"}),
         ("laptop.launch.py", {"detector": "true", "encoder": "false"}, {"box_metric_node"}, {"eye_rotation_node"}),
@@ -148,6 +150,15 @@ def test_the_right_camera_follows_the_left_ones_held_exposure(file, namespace, p
 def test_the_lock_can_be_left_off():
     cameras = [given for name, given in nodes("rig.launch.py", lock="false") if name == "camera_node"]
     assert [given["lock"] for given in cameras] == ["off", "off"]
+
+
+@pytest.mark.parametrize("file", ["sim.launch.py", "rig.launch.py", "laptop.launch.py"])
+def test_attention_is_chosen_by_an_argument(file):
+    def start(**arguments):
+        return next(given for name, given in nodes(file, **arguments) if name == "gaze_controller_node").get("start")
+
+    assert start(attend="true") == "attend"
+    assert start() is None
 
 
 def test_a_model_of_ones_own_reaches_the_detector(tmp_path):

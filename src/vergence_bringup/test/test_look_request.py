@@ -23,6 +23,7 @@ def request(*words):
         (("--stereo", "1", "2", "3", "4"), "STEREO_PIXEL", {"left_x_px": 1.0, "right_x_px": 3.0, "right_y_px": 4.0}),
         (("--class", "cube"), "CLASS", {"class_name": "cube"}),
         (("--angles", "0", "10", "-5"), "ANGLES", {"vergence_rad": math.radians(10), "tilt_rad": math.radians(-5)}),
+        (("--motion",), "MOTION", {}),
         (("--turn", "3", "0", "0"), "RELATIVE_ANGLES", {"version_rad": math.radians(3)}),
     ],
 )
@@ -50,6 +51,7 @@ def test_a_point_in_a_frame():
         ("--pixel", "1"),
         ("--pixel", "1", "nan"),
         ("--pixel", "1", "2", "--class", "cube"),
+        ("--motion", "--class", "cube"),
         ("--point", "1", "2", "inf"),
         ("--pixel", "1", "2", "--eye", "middle"),
         ("--pixel", "1", "2", "--depth", "-1"),

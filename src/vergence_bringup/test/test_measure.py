@@ -100,7 +100,7 @@ def models(monkeypatch):
     )
     nothing = Detections(np.zeros((0, 4)), np.zeros(0), np.zeros(0, np.int64), (), (621, 401))
 
-    def measure_pair(left, right, model):
+    def measure_pair(left, right, model, parameters):
         asked.append(model)
         return BoxVergenceResult(
             BoxStatus.CUT, "a box is cut", nothing, nothing, *boxes, corner_metric(*boxes), center_px=(math.nan, 1.75)
@@ -152,9 +152,86 @@ def test_a_bad_model_is_one_line_and_nothing_is_printed(pair, tmp_path, capsys, 
     assert words in printed.err
 
 
+def built(folder, layout, **options):
+    pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
+    from vergence_metric.testing.onnx_detectors import build_detector
+
+    return str(build_detector(folder / "model.onnx", layout, **options))
+
+
+def red_cell(folder, x):
+    image = np.zeros((96, 128, 3), np.uint8)
+    image[16:32, x : x + 16, 2] = 255
+    path = folder / f"cell_{x}.png"
+    cv2.imwrite(str(path), image)
+    return str(path)
+
+
+def test_layout_and_labels_of_a_model_that_does_not_tell_them(tmp_path, capsys):
+    pair, model = (red_cell(tmp_path, 48), red_cell(tmp_path, 32)), built(tmp_path, "yolov8_rows")
+    command = ["measure", *pair, "--windows", "50", "--json", "--model", model]
+    assert main(command) == 2
+    assert "say which by the parameter 'detector.layout'" in capsys.readouterr().err
+    assert main([*command, "--layout", "yolov8_rows"]) == 0
+    box = json.loads(capsys.readouterr().out)["box"]
+    assert (box["class"], box["center_px"][0]) == ("0", pytest.approx(16.0, abs=1e-3))
+    (tmp_path / "names.txt").write_text("tomato\nleaf\n")
+    assert main([*command, "--labels", str(tmp_path / "names.txt")]) == 0
+    assert json.loads(capsys.readouterr().out)["box"]["class"] == "tomato"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--layout", "yolov8"), "--layout needs --model FILE"),
+        (("--labels", "coco"), "--labels needs --model FILE"),
+        (("--model", "shipped", "--layout", "yolov3"), "'layout' must be one of 'auto', 'yolov6'"),
+        (("--model", "shipped", "--labels", "gone.txt"), "labels gone.txt"),
+        (("--model", "shipped", "--labels", "coco"), "labels coco must name all classes of the model, 1: got 80"),
+    ],
+)
+def test_options_that_do_not_fit_are_one_line(pair, capsys, arguments, words):
+    assert main(["measure", *pair, *arguments]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert words in printed.err
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real pairs (../shared/data/stereo_chessboard) are not here")
 @pytest.mark.parametrize("number", [1, 4])
 def test_real_pairs(number, tmp_path, capsys):
     pair = [str(DATA / f"{eye}0{number}.jpg") for eye in ("left", "right")]
     assert main(["measure", *pair, "--out", str(tmp_path), "--json", "--windows", "50", "100"]) == 0
     check(json.loads(capsys.readouterr().out), tmp_path)
+
+
+def test_the_papers_table_has_the_shapes_both_directions_and_the_two_lists(pair, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["measure", *pair, "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert main(["measure", *pair, "--paper"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "images (401, 621, 3) (401, 621, 3), edges (401, 621) (401, 621)"
+    there, back = ([f"{value:.4f}" for value in figures[f"{way}_px"]] for way in ("left_to_right", "right_to_left"))
+    for i, size in enumerate(figures["windows_px"]):
+        rows = lines[1 + 3 * i : 4 + 3 * i]
+        assert rows[0] == f"{size}x{size}: shapes ({size}, {size}) ({size}, {size})"
+        assert rows[1:] == [f"  left to right {there[i]}", f"  right to left {back[i]}"]
+    assert lines[19:21] == [f"left to right: [{', '.join(there)}]", f"right to left: [{', '.join(back)}]"]
+    saved = {path.name for path in (tmp_path / "paper").iterdir()}
+    assert saved == {
+        *(f"{name}.png" for name in ("left", "right", "left_edges", "right_edges", "combined_edges", "boxes")),
+    }
+    taken, kept = cv2.imread(pair[0]), cv2.imread(str(tmp_path / "paper" / "left.png"))
+    assert kept is not None
+    assert taken is not None
+    assert np.array_equal(kept, taken)
+
+
+def test_the_papers_table_without_a_detector_says_so(pair, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert main(["measure", *pair, "--paper", "--out", str(tmp_path / "out")]) == 0
+    assert "no boxes: onnxruntime is not installed" in capsys.readouterr().out
+    assert not (tmp_path / "out" / "boxes.png").exists()
+    assert main(["measure", *pair, "--paper", "--json"]) == 2

@@ -5,8 +5,9 @@ import re
 
 from sensor_msgs.msg import JointState
 
-from vergence_bringup.figures.watch_screen import Screen, Snapshot, Stream
+from vergence_bringup.figures.watch_screen import Screen, Snapshot
 from vergence_msgs.msg import EdgeVergence, GazeState, VergenceError
+from vergence_rig.stream import Stream
 
 TOPICS = ("vergence/edge", "vergence/error", "vergence/box", "gaze/state", "joint_command", "joint_states")
 LIMITS = {"pan_left": (-1.0, 1.0), "tilt": (-0.5, 0.5)}

@@ -19,12 +19,14 @@ COMMANDS = {
     ),
     "fixation": ("vergence_bringup.commands.fixation", "where axes at the paper's angles C1 and C2 meet"),
     "look": ("vergence_bringup.ros.look", "look at a pixel, a class, a point or by angles, and say whether it verged"),
+    "record": ("vergence_bringup.ros.record", "record a running head into a bag (MCAP)"),
+    "replay": ("vergence_bringup.commands.replay", "measure a recording anew and print what changed"),
     "watch": ("vergence_bringup.ros.watch", "show a running graph in the terminal"),
     "doctor": ("vergence_bringup.commands.doctor", "check this machine: what is missing, and how to install it"),
 }
 
 
-_WITHOUT_GRAPH = {"measure", "doctor"}
+_WITHOUT_GRAPH = {"measure", "doctor", "replay", "fixation"}
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -15,7 +15,8 @@ class NodeEntry:
     Attributes:
         package: the ROS package that holds its executable.
         groups: its parameter groups, as "module:NAME" of a `Groups`.
-        heads: the kinds of head whose graph it belongs to: REAL, SIMULATED, PHOTOGRAPHED (before photographs).
+        heads: the kinds of head whose graph it belongs to: REAL, SIMULATED, PHOTOGRAPHED (before photographs); none for
+            one that is started on request only.
     """
 
     package: str
@@ -32,6 +33,7 @@ NODES: dict[str, NodeEntry] = {
     "photo_node": NodeEntry("vergence_sim", "vergence_sim.photo.parameters:GROUPS", heads=(PHOTOGRAPHED,)),
     "servo_node": NodeEntry("vergence_servo", "vergence_servo.parameters:GROUPS", heads=(REAL,)),
     "sim_node": NodeEntry("vergence_sim", "vergence_sim.parameters:NODE_GROUPS", heads=(SIMULATED,)),
+    "web_node": NodeEntry("vergence_web", "vergence_web.parameters:GROUPS", heads=()),
 }
 
 

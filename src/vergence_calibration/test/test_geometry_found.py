@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 import yaml
 
@@ -27,6 +28,8 @@ from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import JOINT_NAMES, CameraSpec, EyeMount, Joints, Rig, default_rig
 from vergence_rig.rig_file import load_rig
 from vergence_rig.servo import ServoPlant
+
+Array = npt.NDArray[np.float64]
 
 DEG = math.pi / 180
 NOISE_PX, WRONG_SHARE, SEEN_SHARE = 0.3, 0.03, 0.4
@@ -94,10 +97,12 @@ def sightings(truth: Rig, room: Room, seed: int, stops_anywhere: bool = False) -
     kinematics, start = Kinematics(truth), default_rig()
     planned = planned_poses(start, PoseParameters())
     view, point, pixels = [], [], []
-    for number, pose in enumerate(planned):
+    for number, pose in enumerate(planned, start=-1):
         for name, plant in plants.items():
-            plant.command(pose[name], float(number))
-        shafts = np.array([plants[name].step(number + 0.9) for name in JOINT_NAMES])
+            plant.command(pose[name], number + 1.0)
+        shafts = np.array([plants[name].step(number + 1.9) for name in JOINT_NAMES])
+        if number < 0:
+            continue
         if stops_anywhere:
             plays = [truth.joints[name].servo.half_play_rad for name in JOINT_NAMES]
             shafts = np.array([pose[name] for name in JOINT_NAMES]) + random.uniform(-1, 1, 3) * plays
@@ -119,7 +124,7 @@ def sightings(truth: Rig, room: Room, seed: int, stops_anywhere: bool = False) -
     often = np.bincount(points)[points] >= 3
     _, points = np.unique(points[often], return_inverse=True)
     joints = [[pose[name] for name in JOINT_NAMES] for pose in planned]
-    return Observations(views[often], points, np.vstack(pixels)[often]), visited(start, joints, joints[0])
+    return Observations(views[often], points, np.vstack(pixels)[often]), visited(start, joints[1:], joints[0])
 
 
 def cameras_of(rig: Rig, calibrated: bool = False) -> dict[str, EyeCamera]:
@@ -184,6 +189,42 @@ def test_a_head_with_cameras_without_calibration_is_found(found_uncalibrated: tu
     assert found.residual_before_px > 5
     assert found.residual_px < 0.6
     assert found.kept == ()
+
+
+def ray_of(rig: Rig, left: bool, joints: list[float], pixel: Array) -> tuple[Array, Array]:
+    """Return the lens (3,) and the unit ray (3,) of a pixel (1, 2), as a description of the head has them."""
+    kinematics, (pan_left, pan_right, tilt) = Kinematics(rig), rig.eye_angles(joints)
+    pan = pan_left if left else pan_right
+    flat = CameraModel(rig.camera(left)).undistort(pixel)[0]
+    ray = kinematics.rotation_rig_from_camera(left, pan, tilt) @ np.array([*flat, 1.0])
+    return kinematics.lens(left, pan, tilt), ray / np.linalg.norm(ray)
+
+
+def distance_of(rig: Rig, joints: list[float], pixels: dict[bool, Array]) -> float:
+    """Return how far from the head the rays of both eyes' pixels meet, nearly [m]."""
+    rays = [ray_of(rig, left, joints, pixel) for left, pixel in pixels.items()]
+    across = [np.eye(3) - np.outer(ray, ray) for _, ray in rays]
+    meet = np.linalg.solve(sum(across), sum(a @ lens for a, (lens, _) in zip(across, rays, strict=True)))
+    return float(np.linalg.norm(meet))
+
+
+def test_distances_are_as_uncertain_as_the_pans_are_said_to_be(found_uncalibrated: tuple[FoundGeometry, Rig]) -> None:
+    found, truth = found_uncalibrated
+    random, ratios = np.random.default_rng(5), []
+    for _ in range(100):
+        pan, tilt, distance_m = random.uniform((-0.5, -0.3, 0.4), (0.5, 0.3, 1.5))
+        direction = np.array([math.cos(pan) * math.cos(tilt), math.sin(pan) * math.cos(tilt), -math.sin(tilt)])
+        joints = list(truth.joint_angles([pan + 0.03, pan - 0.03, tilt]))
+        pixels = {}
+        for left in (True, False):
+            kinematics, (pan_left, pan_right, tilted) = Kinematics(truth), truth.eye_angles(joints)
+            at = (left, pan_left if left else pan_right, tilted)
+            seen = (distance_m * direction - kinematics.lens(*at)) @ kinematics.rotation_rig_from_camera(*at)
+            pixels[left] = CameraModel(truth.camera(left)).ray_to_pixel(seen[None])
+        true_m, found_m = (distance_of(rig, joints, pixels) for rig in (truth, found.rig))
+        vergence_error_rad = (found_m / true_m - 1.0) * truth.baseline_m / true_m
+        ratios.append(vergence_error_rad / (math.sqrt(2.0) * found.rig.zero_sigma_rad))
+    assert 0.3 < math.sqrt(float(np.mean(np.square(ratios)))) < 2.0
 
 
 def test_it_is_written_and_read_back(found_uncalibrated: tuple[FoundGeometry, Rig], tmp_path) -> None:
@@ -298,7 +339,7 @@ def test_a_view_without_texture_is_refused() -> None:
     head = StaringHead(dict.fromkeys(EYES, blank))
     with pytest.raises(IdentifyError, match="features for the geometry: got 0 in the median view"):
         identify_geometry(head, default_rig(), PoseParameters(poses=24))
-    assert head.looks == 24
+    assert head.looks == 25
 
 
 def test_a_calibration_of_another_shape_is_refused() -> None:

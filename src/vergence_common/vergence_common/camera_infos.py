@@ -27,4 +27,4 @@ def subscribe_camera_info(
             before = sent[_STAMP_END:]
             on_change(deserialize_message(sent, CameraInfo))
 
-    return watch.create_subscription(CameraInfo, topic, on_message, qos, raw=True)
+    return watch.create_subscription(CameraInfo, topic, on_message, qos, serialised=True)

@@ -74,9 +74,9 @@ class QosWatch:
         topic: str,
         callback: Callable[[Any], None],
         qos: QoSProfile = STATE_QOS,
-        raw: bool = False,
+        serialised: bool = False,
     ) -> Subscription:
-        """As Node.create_subscription, overridable and watched; with `raw` messages are passed as they were sent."""
+        """As Node.create_subscription, overridable and watched; `serialised` calls with bytes instead of messages."""
 
         def mismatch(event: QoSRequestedIncompatibleQoSInfo) -> None:
             what = "a publisher offers less than the subscriber requests"
@@ -89,7 +89,7 @@ class QosWatch:
             copy(qos),
             qos_overriding_options=overridable(),
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=mismatch),
-            raw=raw,
+            raw=serialised,
         )
 
     def report(self) -> Report:

@@ -4,8 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from vergence_gaze.joints.limits import LONGEST_STEP_S, CommandLimits
+from vergence_gaze.joints.smooth_limits import SmoothLimits
 from vergence_rig.rig import Rig, default_rig
 from vergence_rig.servo import IDEAL
 
@@ -90,3 +93,40 @@ def test_a_hundred_thousand_hostile_commands(minimum_rad: float) -> None:
         assert limits.allows(sent), (i, wanted[i], last, sent)
         assert (np.abs(sent - last) <= limits.speed_rad_s * passed_s + 1e-12).all(), (i, wanted[i], last, sent)
         last = sent
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.lists(st.floats(-3.0, 3.0) | st.just(math.nan), min_size=3, max_size=3), st.integers(1, 40)),
+        min_size=1,
+        max_size=8,
+    ),
+    st.floats(0.1, 5.0),
+    st.floats(1.0, 60.0),
+)
+def test_smooth_limits_hold_speed_and_acceleration_and_all_others(
+    desired: list[tuple[list[float], int]], speed_rad_s: float, acceleration_rad_s2: float
+) -> None:
+    limits, plain, step_s = SmoothLimits(RIG, speed_rad_s, acceleration_rad_s2), CommandLimits(RIG), 0.02
+    last, rate = np.zeros(3), np.zeros(3)
+    for angles, count in desired:
+        for _ in range(count):
+            sent = limits.limited(np.array(angles), last, step_s, np.zeros(3))
+            assert plain.allows(sent, 1e-9)
+            now = (sent - last) / step_s
+            assert (np.abs(now) <= np.minimum(speed_rad_s, plain.speed_rad_s) + 1e-9).all()
+            # The joints' own limits may stop a joint faster; none starts faster, unless both eyes' common one moves it.
+            faster = np.abs(now) > np.abs(rate) + acceleration_rad_s2 * step_s + 1e-6
+            parallel = min(sent[1] - sent[0], last[1] - last[0]) < plain.minimum_vergence_rad + 1e-3
+            assert not (faster[2] if parallel else faster.any())
+            last, rate = sent, now
+
+
+def test_smooth_limits_arrive_and_do_not_overshoot() -> None:
+    limits, last, wanted = SmoothLimits(RIG, 2.5, 20.0), np.zeros(3), np.array([0.5, 0.55, -0.3])
+    for _ in range(100):
+        sent = limits.limited(wanted, last, 0.02, np.zeros(3))
+        assert (np.abs(wanted - sent) <= np.abs(wanted - last) + 1e-12).all()
+        last = sent
+    assert last == pytest.approx(wanted, abs=1e-4)

@@ -67,6 +67,14 @@ def test_nothing_is_learnt_across_two_targets() -> None:
     np.testing.assert_array_equal(estimator.half_play_rad, 0.01)
 
 
+def test_nothing_is_learnt_from_a_target_that_is_seen_to_move() -> None:
+    estimator = PlayEstimator(np.full(3, 0.01), 0.7)
+    for i in range(12):
+        angle = 0.1 * (i // 3 % 2)  # three sights at each place, past which the target moves on
+        estimator.observe(0.05 * i, np.full(3, angle), np.full(3, 0.004 * i - angle))
+    np.testing.assert_array_equal(estimator.half_play_rad, 0.01)
+
+
 def rests(real: ServoSpec, seed: int, learning: float) -> tuple[float, float]:
     """Return how far aside the eyes are at the end of 3 s, and by how much they still swing [deg]."""
     rig = default_rig()

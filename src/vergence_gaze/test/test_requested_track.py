@@ -1,5 +1,6 @@
 """A click asks the tracker for its point; once the tracker answers, nothing else near the fovea is the target."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -32,12 +33,14 @@ def commands(head: FakeHead, controller: GazeController, until_s: float, answer_
     return done
 
 
-def clicked(vision: VisionModel, **mistaken) -> tuple[FakeHead, GazeController]:
+def clicked(
+    vision: VisionModel, extent_rad: tuple[float, float] = (math.nan, math.nan), **mistaken
+) -> tuple[FakeHead, GazeController]:
     head = FakeHead(default_rig(), lambda time_s: PLACE, vision, 3, mistaken=mistaken)
     controller = GazeController(default_rig(), gaze_parameters(), 6 * TICK_S)
     commands(head, controller, 0.2)
     x, y = head.project(PLACE, left=True)
-    goal = Goal(GoalKind.PIXEL, left_xy=(float(x), float(y)), stamp_s=0.15, time_limit_s=60.0)
+    goal = Goal(GoalKind.PIXEL, left_xy=(float(x), float(y)), stamp_s=0.15, time_limit_s=60.0, extent_rad=extent_rad)
     controller.look_at(goal, head.time_s)
     return head, controller
 
@@ -48,6 +51,13 @@ def test_a_click_asks_for_its_point_in_its_own_image() -> None:
     requests = [command.track_request for command in commands(head, controller, 0.4)]
     assert requests[0] == TrackRequest(1, 0.15, True, (float(x), float(y)))
     assert set(requests[1:]) == {None}
+
+
+def test_a_box_asks_for_a_thing_of_its_size() -> None:
+    head, controller = clicked(VisionModel(), extent_rad=(0.1, 0.05))
+    asked = commands(head, controller, 0.4)[0].track_request
+    assert asked is not None
+    assert asked.extent_rad == (0.1, 0.05)
 
 
 def test_boxes_of_something_else_do_not_pull_the_eyes() -> None:
@@ -73,6 +83,30 @@ def test_a_goal_without_a_pixel_frees_the_tracker(kind: GoalKind) -> None:
     goal = Goal(kind, point_m=(0.8, 0.0, 0.0), class_name="cube", version_rad=0.1, vergence_rad=0.1, tilt_rad=0.0)
     controller.look_at(goal, 1.0)
     assert controller.step(1.02, []).track_request == TrackRequest(0)
+
+
+def test_motion_is_waited_for_with_still_eyes_and_then_verged_on() -> None:
+    head = FakeHead(default_rig(), lambda time_s: PLACE, VisionModel(), 3, visible=lambda time_s: time_s > 2.0)
+    controller = GazeController(default_rig(), gaze_parameters(), 6 * TICK_S)
+    commands(head, controller, 0.2)
+    controller.look_at(Goal(GoalKind.MOTION, time_limit_s=60.0), head.time_s)
+    start = head.true_rad
+    waiting = commands(head, controller, 2.0)
+    assert [c.track_request for c in waiting if c.track_request is not None] == [TrackRequest(1, motion=True)]
+    np.testing.assert_allclose(head.true_rad, start, atol=0.02)
+    assert not any(command.outcomes for command in waiting)
+    outcomes = [outcome for command in commands(head, controller, 5.0) for outcome in command.outcomes]
+    assert [outcome.result for outcome in outcomes] == [Result.VERGED], outcomes
+    assert np.abs(np.degrees(head.true_errors_rad())).max() < 0.5
+
+
+def test_motion_that_does_not_come_ends_the_goal_with_its_reason() -> None:
+    head = FakeHead(default_rig(), lambda time_s: PLACE, VisionModel(), 3, visible=lambda time_s: False)
+    controller = GazeController(default_rig(), gaze_parameters(), 6 * TICK_S)
+    commands(head, controller, 0.2)
+    controller.look_at(Goal(GoalKind.MOTION, time_limit_s=2.0), head.time_s)
+    outcomes = [outcome for command in commands(head, controller, 3.0) for outcome in command.outcomes]
+    assert [outcome.result for outcome in outcomes] == [Result.LOST], outcomes
 
 
 def test_the_result_is_verged_on_the_point() -> None:

@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 import vergence_gaze.laws  # noqa: F401  registers the shipped laws
+from vergence_gaze.attention_parameters import AttentionParameters
 from vergence_gaze.law_registry import law_groups
 from vergence_gaze.parameters import (
     ExposureParameters,
@@ -16,7 +17,7 @@ from vergence_gaze.parameters import (
 )
 from vergence_gaze.target_parameters import TargetParameters
 from vergence_gaze.verged_parameters import VergedParameters
-from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError
+from vergence_rig.parameters import Groups, Parameters, replaced_groups
 
 _FIXED: Groups = (
     ("", GazeNodeParameters),
@@ -26,6 +27,7 @@ _FIXED: Groups = (
     ("target.", TargetParameters),
     ("verged.", VergedParameters),
     ("search.", SearchParameters),
+    ("attention.", AttentionParameters),
 )
 _NONE: Mapping[str, Any] = MappingProxyType({})
 
@@ -42,9 +44,9 @@ GROUPS: Groups = gaze_groups()
 def collected(groups: Iterable[Parameters]) -> GazeParameters:
     """Return the controller's parameters from one instance of every group."""
     by_kind: dict[type[Parameters], Any] = {type(group): group for group in groups}
-    control, saccade, exposure, servo, target, verged, search = (by_kind[kind] for _, kind in _FIXED)
+    control, saccade, exposure, servo, target, verged, search, attention = (by_kind[kind] for _, kind in _FIXED)
     laws = tuple(by_kind[kind] for _, kind in law_groups())
-    return GazeParameters(control, saccade, exposure, servo, target, verged, search, laws)
+    return GazeParameters(control, saccade, exposure, servo, target, verged, search, attention, laws)
 
 
 def gaze_parameters(values: Mapping[str, Any] = _NONE) -> GazeParameters:
@@ -52,17 +54,4 @@ def gaze_parameters(values: Mapping[str, Any] = _NONE) -> GazeParameters:
 
     Raises ParameterError, with the full name, for an unknown name or an invalid value.
     """
-    groups = gaze_groups()
-    known = {prefix + spec.name for prefix, kind in groups for spec in kind.specs()}
-    for name, value in values.items():
-        if name not in known:
-            raise UnknownParameterError(name, value, known)
-    return collected(_group(prefix, kind, values) for prefix, kind in groups)
-
-
-def _group(prefix: str, kind: type[Parameters], values: Mapping[str, Any]) -> Parameters:
-    own = {spec.name: values[prefix + spec.name] for spec in kind.specs() if prefix + spec.name in values}
-    try:
-        return kind.from_mapping(own)
-    except ParameterError as error:
-        raise ParameterError(prefix + error.name, error.value, error.allowed) from None
+    return collected(replaced_groups(gaze_groups(), values))

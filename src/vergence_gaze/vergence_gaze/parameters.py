@@ -6,6 +6,7 @@ Default angles have 17 digits so that the YAML equals them exactly.
 from dataclasses import dataclass
 from typing import TypeVar
 
+from vergence_gaze.attention_parameters import AttentionParameters
 from vergence_gaze.law_registry import law_names
 from vergence_gaze.target_parameters import TargetParameters
 from vergence_gaze.verged_parameters import VergedParameters
@@ -28,8 +29,9 @@ class ControlParameters(Parameters):
     tilt_enabled: bool = parameter(True, "whether the controller may turn the tilt joint")
     start: str = parameter(
         "idle",
-        "behaviour before the first goal: hold still, or verge on what the left eye sees",
-        choices=("idle", "verge"),
+        "behaviour without a goal: idle holds still, verge verges on what the left eye sees before the first goal, "
+        "attend looks at what is of interest, as attention.* says",
+        choices=("idle", "verge", "attend"),
     )
     time_limit_s: float = parameter(
         5.0,
@@ -184,6 +186,7 @@ class GazeParameters:
     target: TargetParameters
     verged: VergedParameters
     search: SearchParameters
+    attention: AttentionParameters
     laws: tuple[Parameters, ...]
 
     def of_law(self, kind: type[Group]) -> Group:

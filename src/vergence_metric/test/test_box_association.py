@@ -13,9 +13,8 @@ from vergence_metric.boxes.assignment import optimal_assignment
 from vergence_metric.boxes.association import associate
 from vergence_metric.boxes.corner_metric import corner_metric, hidden_sides
 from vergence_metric.boxes.detections import Box
-from vergence_metric.boxes.following import TargetMemory
 from vergence_metric.boxes.pair_geometry import PairGeometry
-from vergence_metric.boxes.parameters import AssociationParameters, FollowParameters
+from vergence_metric.boxes.parameters import AssociationParameters
 from vergence_metric.boxes.patch_descriptor import descriptor_correlation, patch_descriptor
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, gaze_for_point, rotation_rig_from_optical
@@ -23,8 +22,6 @@ from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
 
 P = AssociationParameters()
-FOLLOW = FollowParameters()
-SIZE = (640, 480)
 CUT_LEFT, CUT_TOP, CUT_RIGHT, CUT_BOTTOM = ((i == 0, i == 1, i == 2, i == 3) for i in range(4))
 
 
@@ -197,65 +194,6 @@ def test_the_side_that_disagrees_is_the_hidden_one(disparity, expected):
     # Left sides differ by 10, right ones by 30.
     assert hidden_sides(whole, narrow, 1.25, disparity, 0.0) == expected
     assert hidden_sides(whole, replace(narrow, xyxy_px=(90, 50, 145, 110)), 1.25, disparity, 0.0) == (False,) * 4
-
-
-def choose(memory, left, right, stamp_s, setup=None):
-    return memory.choose(associate(left, right, P, geometry=setup), stamp_s, SIZE, setup)
-
-
-def test_the_target_stays_the_target():
-    memory = TargetMemory(FOLLOW)
-    first, second = [box(200, 200, score=0.9), box(450, 300, score=0.6)], [box(180, 200, score=0.9), box(430, 300, 60)]
-    assert choose(memory, first[:1], second[:1], 0.0).pair.left is first[0]
-    stronger = box(452, 300, score=0.99)
-    found = choose(memory, [box(205, 200, score=0.5), stronger], second, 0.1)
-    assert found.pair.left.center_px[0] == 205
-    # Gone for a moment: nothing else is taken for it, and then something is.
-    assert choose(memory, [stronger], second[1:], 0.2).pair is None
-    assert choose(memory, [stronger], second[1:], 0.1 + FOLLOW.forget_after_s + 0.01).pair.left is stronger
-
-
-def test_the_target_is_known_again_though_the_eyes_turned():
-    memory = TargetMemory(FOLLOW)
-    choose(memory, [box(419.5, 239.5)], [box(419.5, 239.5)], 0.0, geometry())
-    turned = geometry(EyeAngles(-0.2, -0.2, 0.0))
-    there = turned.pixel(True, geometry().direction(True, (419.5, 239.5)))
-    assert there[0] < 320
-    same, decoy = box(*there), box(419.5, 239.5, score=0.99)
-    found = choose(memory, [decoy, same], [replace(decoy), replace(same)], 0.1, turned)
-    assert found.pair.left is same
-
-
-def test_one_eye_blind():
-    memory = TargetMemory(FOLLOW)
-    seen = box(300, 200)
-    assert choose(memory, [seen], [], 0.0).left is seen
-    assert choose(TargetMemory(FOLLOW), [], [seen], 0.0).right is seen
-    nothing = choose(TargetMemory(FOLLOW), [], [], 0.0)
-    assert nothing.pair is None
-    assert nothing.left is None
-    assert nothing.right is None
-
-
-def test_the_past_settles_an_ambiguous_pair():
-    memory = TargetMemory(FOLLOW)
-    choose(memory, [box(300, 200)], [box(200, 200)], 0.0)
-    boxes = [box(302, 200)], [box(272, 200), box(202, 201)]
-    assert associate(*boxes, P).pairs[0].ambiguous
-    settled = associate(*boxes, P, expected=memory.expected(0.05, None)).pairs[0]
-    assert settled.right.center_px[0] == 202
-    assert not settled.ambiguous
-    assert memory.expected(5.0, None) is None
-
-
-def test_a_guess_does_not_become_the_past():
-    memory = TargetMemory(FOLLOW)
-    found = associate([box(300, 200)], [box(270, 200), box(200, 201)], P)
-    assert found.pairs[0].ambiguous
-    memory.choose(found, 0.0, SIZE, None)
-    expected = memory.expected(0.1, None)
-    assert expected is not None
-    assert (expected.left_px, expected.right_px) == ((300, 200), None)
 
 
 def test_gaze_geometry_of_a_fixated_point_has_no_disparity():

@@ -1,4 +1,4 @@
-"""Every layout is found and read; what cannot be used says so in one line."""
+"""What a detector does with images, classes and parameters; what cannot be used says so in one line."""
 
 import sys
 from pathlib import Path
@@ -19,17 +19,10 @@ from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_rig.parameters import ParameterError
 
 onnx = pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")
-TensorProto, helper = onnx.TensorProto, onnx.helper
 
-LAYOUTS = {
-    "yolov6": "yolov6",
-    "yolov5": "yolov5",
-    "yolov8": "yolov8",
-    "yolox": "yolox",
-    "yolov10": "yolov10",
-    "end_to_end": "yolov6_end_to_end",
-    "ort": "yolov6_ort",
-}
+from vergence_metric.testing.onnx_detectors import constant_detector  # noqa: E402
+
+TensorProto, helper = onnx.TensorProto, onnx.helper
 
 
 def picture(width: int = 128, height: int = 96) -> np.ndarray:
@@ -42,18 +35,6 @@ def picture(width: int = 128, height: int = 96) -> np.ndarray:
 
 def load(path: Path, **changes: object) -> Detector:
     return Detector(DetectorParameters(model=str(path)).replaced(**{"threshold": 0.5} | changes))
-
-
-@pytest.mark.parametrize("kind", LAYOUTS)
-def test_every_layout_is_found_and_read(kind, onnx_model):
-    # The input of YOLOX is BGR bytes, with which this model's scores would be 255 times too high.
-    override = {"color": "rgb", "scale": "unit", "resize": "letterbox"} if kind == "yolox" else {}
-    detector = load(onnx_model(kind), **override)
-    assert detector.layout.name == LAYOUTS[kind]
-    found = detector.detect(picture())
-    np.testing.assert_allclose(found.xyxy_px, [[31.5, 15.5, 47.5, 31.5], [79.5, 47.5, 95.5, 63.5]], atol=0.02)
-    np.testing.assert_allclose(found.scores, [1.0, 230 / 255], atol=1e-5)
-    assert found.class_ids.tolist() == [0, 1]
 
 
 @pytest.mark.parametrize("kind", ["yolov6", "yolov8", "end_to_end", "ort"])
@@ -87,51 +68,6 @@ def test_channels_and_range_can_be_overridden(onnx_model):
     assert byte.scores[0] == pytest.approx(255.0)
 
 
-def test_one_class_yolov6_is_distinguished_from_end_to_end(onnx_model):
-    # Both are (1, N, 6); objectness is 1 throughout.
-    detector = load(onnx_model("yolov6", classes=1))
-    assert detector.layout.name == "yolov6"
-    assert len(detector.detect(picture())) == 1
-
-
-def test_a_shape_that_could_be_two_layouts_asks_for_one(tmp_path):
-    """Rows whose values agree with no layout: the shape alone does not decide."""
-    rows = np.zeros((1, 252, 6), np.float32)  # 252 = cells of 128x96
-    rows[..., :4] = [64, 48, 72, 56]
-    rows[..., 4], rows[..., 5] = np.linspace(0.9, 0.1, 252), 0.0
-    path = constant_model(tmp_path, rows)
-    with pytest.raises(ModelLayoutError, match=r"could be yolov6 or yolox or yolov10: say which by .*detector\.layout"):
-        load(path)
-    assert load(path, layout="yolov10").layout.name == "yolov10"
-    assert load(path, layout="yolov6").layout.name == "yolov6"
-
-
-def constant_model(folder: Path, *outputs: np.ndarray, task: str = "") -> Path:
-    """A model that always gives the same outputs."""
-    mean = helper.make_node("ReduceMean", ["images"], ["mean"], keepdims=0)
-    nothing = helper.make_node("Mul", ["mean", "zero"], ["nothing"])
-    names = [f"output{i}" for i in range(len(outputs))]
-    graph = helper.make_graph(
-        [mean, nothing, *(helper.make_node("Add", [f"constant_{name}", "nothing"], [name]) for name in names)],
-        "constant",
-        [helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, 96, 128])],
-        [helper.make_tensor_value_info(name, TensorProto.FLOAT, None) for name in names],
-        [
-            onnx.numpy_helper.from_array(np.array(0.0, np.float32), "zero"),
-            *(
-                onnx.numpy_helper.from_array(output, f"constant_{name}")
-                for name, output in zip(names, outputs, strict=True)
-            ),
-        ],
-    )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
-    if task:
-        helper.set_model_props(model, {"task": task})
-    path = folder / "constant.onnx"
-    onnx.save(model, str(path))
-    return path
-
-
 class CornerRows(Layout):
     """A layout of one's own: rows of five columns, corners and score of one class."""
 
@@ -149,7 +85,9 @@ class CornerRows(Layout):
 
 
 def test_a_layout_of_ones_own_can_be_registered(tmp_path, monkeypatch):
-    path = constant_model(tmp_path, np.array([[[8, 16, 40, 64, 0.9], [8, 16, 41, 64, 0.7]]], np.float32))
+    path = constant_detector(
+        tmp_path / "rows.onnx", np.array([[[8, 16, 40, 64, 0.9], [8, 16, 41, 64, 0.7]]], np.float32)
+    )
     with pytest.raises(ModelLayoutError, match="must have one of the detector layouts"):
         load(path)
     monkeypatch.setattr(registry, "_LAYOUTS", dict(registry._LAYOUTS))
@@ -165,21 +103,6 @@ def test_a_layout_of_ones_own_can_be_registered(tmp_path, monkeypatch):
 def test_a_layout_that_is_not_registered_is_refused():
     with pytest.raises(ParameterError, match="corner_rows"):
         DetectorParameters(layout="corner_rows")
-
-
-def test_a_model_that_is_no_detector(tmp_path):
-    with pytest.raises(ModelLayoutError, match=r"must have one of the detector layouts .*: got output0 \[1, 1000\]"):
-        load(constant_model(tmp_path, np.zeros((1, 1000), np.float32)))
-
-
-def test_a_model_for_another_task(tmp_path):
-    with pytest.raises(ModelLayoutError, match="task must be 'detect': got 'segment'"):
-        load(constant_model(tmp_path, np.zeros((1, 37, 252), np.float32), task="segment"))
-
-
-def test_a_wanted_layout_that_does_not_fit(onnx_model):
-    with pytest.raises(ModelLayoutError, match="must have the layout 'yolov8'"):
-        load(onnx_model("yolov6"), layout="yolov8")
 
 
 def test_a_missing_file(tmp_path):
@@ -261,41 +184,3 @@ def test_the_model_names_its_own_threshold(onnx_model):
     assert len(load(strict, threshold=0.0).detect(picture())) == 1
     assert len(load(strict, threshold=0.5).detect(picture())) == 2
     assert load(onnx_model("yolov6", metadata={"threshold": "high"}), threshold=0.0).threshold == 0.35
-
-
-def yolov8_output(classes: int = 2) -> np.ndarray:
-    """Boxes that grow, and small scores, for the 252 cells of 128x96."""
-    output = np.zeros((1, 4 + classes, 252), np.float32)
-    output[0, :4] = np.linspace(10, 90, 252)
-    output[0, 4:] = np.linspace(0.0, 0.3, 252)
-    return output
-
-
-@pytest.mark.parametrize("layout", ["auto", "yolox", "yolov8"])
-@pytest.mark.parametrize("shape", [(1, 252, 4), (1, 252), (1, 10), (1, 32, 24, 32), (1,)])
-def test_an_output_that_no_layout_explains_refuses_the_model(tmp_path, shape, layout):
-    model = constant_model(tmp_path, yolov8_output(), np.zeros(shape, np.float32))
-    with pytest.raises(ModelLayoutError, match=r"must be explained: output1 \[1") as refused:
-        load(model, layout=layout)
-    assert "\n" not in str(refused.value)
-
-
-def test_boxes_and_scores_apart_are_no_yolox(tmp_path):
-    boxes, scores = np.zeros((1, 252, 4), np.float32), np.zeros((1, 252, 80), np.float32)
-    with pytest.raises(ModelLayoutError, match=r"must be explained: output0 \[1, 252, 4\]"):
-        load(constant_model(tmp_path, boxes, scores))
-
-
-def test_the_maps_before_decoding_are_explained(tmp_path):
-    maps = [np.zeros((1, 66, 96 // s, 128 // s), np.float32) for s in (8, 16, 32)]
-    assert load(constant_model(tmp_path, yolov8_output(), *maps)).layout.name == "yolov8"
-
-
-def test_nan_is_an_error_at_the_start_and_later(tmp_path, onnx_model):
-    broken = yolov8_output()
-    broken[0, 4, 7] = np.nan
-    with pytest.raises(ModelLayoutError, match=r"must be numbers: 0% of \[1, 6, 252\] are NaN"):
-        load(constant_model(tmp_path, broken))
-    detector = load(onnx_model("yolov8"))
-    with pytest.raises(DetectorError, match="output 0 of the model must be numbers"):
-        detector.layout.candidates([np.full((1, 6, 252), np.nan, np.float32)], (128, 96), 0.5)

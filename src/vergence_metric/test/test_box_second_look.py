@@ -50,6 +50,11 @@ def brightest(crop):
     return Candidates(np.array([[x0, y0, width_end, height_end]], float), np.array([0.9]), np.array([0]))
 
 
+def seen(boxes, scores=0.8, class_id=0):
+    boxes = np.atleast_2d(np.asarray(boxes, float))
+    return Candidates(boxes, np.full(len(boxes), scores), np.full(len(boxes), class_id, np.int64))
+
+
 def nothing(crops):
     return [Candidates(np.empty((0, 4)), np.empty(0), np.empty(0, np.int64)) for _ in crops]
 
@@ -65,7 +70,8 @@ def nothing(crops):
 def test_a_thing_seen_again_gets_finer_sides(x, y, width, height, off):
     true = np.array([x - 0.5, y - 0.5, x + width - 0.5, y + height - 0.5])
     first = true + np.array(off) * [width, height, width, height]
-    boxes, scores = look_again(picture(true), first[None], np.array([0.6]), np.array([0]), FIRST_SCALE, bright)
+    again = look_again(picture(true), seen(first, 0.6), FIRST_SCALE, bright)
+    boxes, scores = again.xyxy, again.scores
     scale = max(1.7 * width / CROP_PX[0], 1.7 * height / CROP_PX[1], 0.3)
     # Of the first look's error its share stays, and a pixel or so of the crop.
     stays = scale**2 / (scale**2 + FIRST_SCALE**2)
@@ -77,8 +83,7 @@ def test_the_look_with_the_finer_pixels_counts_more():
     box = np.array([100.0, 100, 160, 160])
     own = Window.about(box, SIZE).scale
     coarse, alike, fine = (
-        look_again(picture(box + 5.0), box[None], np.array([0.8]), np.array([0]), scale, bright)[0][0]
-        for scale in (1e4 * own, own, 1e-4 * own)
+        look_again(picture(box + 5.0), seen(box), scale, bright).xyxy[0] for scale in (1e4 * own, own, 1e-4 * own)
     )
     np.testing.assert_allclose(fine, box, atol=1e-3)
     np.testing.assert_allclose(coarse, box + 5.0, atol=2.0 * own)
@@ -87,38 +92,52 @@ def test_the_look_with_the_finer_pixels_counts_more():
 
 def test_a_thing_that_the_second_look_does_not_find_loses_half_its_score():
     box = np.array([[100.0, 100, 160, 160]])
-    boxes, scores = look_again(picture(box[0]), box, np.array([0.8]), np.array([0]), FIRST_SCALE, nothing)
-    np.testing.assert_array_equal(boxes, box)
-    assert scores.tolist() == [0.4]
+    again = look_again(picture(box[0]), seen(box), FIRST_SCALE, nothing)
+    np.testing.assert_array_equal(again.xyxy, box)
+    assert again.scores.tolist() == [0.4]
 
 
 def test_another_class_or_place_is_not_the_same_thing():
     box = np.array([[100.0, 100, 160, 160]])
-    _, other_class = look_again(picture(box[0]), box, np.array([0.8]), np.array([1]), FIRST_SCALE, bright)
-    assert other_class.tolist() == [0.4]
-    _, elsewhere = look_again(
-        picture((100, 100, 160, 160)), box + 25.0, np.array([0.8]), np.array([0]), FIRST_SCALE, bright
-    )
-    assert elsewhere.tolist() == [0.4]
+    other_class = look_again(picture(box[0]), seen(box, class_id=1), FIRST_SCALE, bright)
+    assert other_class.scores.tolist() == [0.4]
+    elsewhere = look_again(picture((100, 100, 160, 160)), seen(box + 25.0), FIRST_SCALE, bright)
+    assert elsewhere.scores.tolist() == [0.4]
 
 
 def test_looks_are_bounded_and_the_rest_stays():
-    seen: list[tuple[int, ...]] = []
+    shapes: list[tuple[int, ...]] = []
 
     def count(crops):
-        seen.extend(crop.shape for crop in crops)
+        shapes.extend(crop.shape for crop in crops)
         return nothing(crops)
 
     boxes = np.tile([[10.0, 10, 50, 50]], (9, 1)) + 45.0 * np.arange(9)[:, None]
-    _, scores = look_again(picture((0, 0, 4, 4)), boxes, np.full(9, 0.8), np.zeros(9, np.int64), FIRST_SCALE, count)
-    assert seen == [(CROP_PX[1], CROP_PX[0], 3)] * MOST_LOOKS
+    scores = look_again(picture((0, 0, 4, 4)), seen(boxes), FIRST_SCALE, count).scores
+    assert shapes == [(CROP_PX[1], CROP_PX[0], 3)] * MOST_LOOKS
     assert scores.tolist() == [0.4] * MOST_LOOKS + [0.8] * (9 - MOST_LOOKS)
 
 
 @pytest.mark.parametrize("box", [(-0.5, -0.5, 40, 40), (600, 440, 639.5, 479.5), (-0.5, -0.5, 639.5, 479.5)])
 def test_boxes_at_the_border_and_of_the_whole_image_can_be_looked_at(box):
-    boxes, _ = look_again(picture(box), np.array([box], float), np.array([0.8]), np.array([0]), FIRST_SCALE, bright)
-    assert np.isfinite(boxes).all()
+    assert np.isfinite(look_again(picture(box), seen(box), FIRST_SCALE, bright).xyxy).all()
+
+
+def test_landmarks_get_finer_as_their_box_does():
+    box = np.array([[100.0, 100, 160, 160]])
+    points = np.array([[[110.0, 120], [150, 120]]])
+    first = Candidates(box + 4.0, np.array([0.8]), np.array([0]), points + 4.0)
+
+    def with_points(crops):
+        found = bright(crops)
+        window = Window.about(first.xyxy[0], SIZE)
+        there = (points + 0.5 - [window.x, window.y]) / window.scale
+        return [Candidates(found[0].xyxy, found[0].scores, found[0].class_ids, there)]
+
+    again = look_again(picture(box[0]), first, FIRST_SCALE, with_points)
+    assert again.landmarks is not None
+    share = FIRST_SCALE**2 / (FIRST_SCALE**2 + Window.about(first.xyxy[0], SIZE).scale ** 2)
+    np.testing.assert_allclose(again.landmarks, points + 4.0 * (1.0 - share), atol=1e-9)
 
 
 def test_crops_go_through_the_model_at_once_or_one_by_one_alike(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import PairMeasurementParameters
+from vergence_metric.tracking.request import TrackRequest
 from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import default_rig
@@ -82,6 +83,23 @@ def test_without_joints_or_a_fitting_camera_there_is_no_track_but_a_reason(
     small = measurement.edge(view(0, 120, 160), view(0, 120, 160))
     track = measurement.track(small, 0.0, AT_REST, None)
     assert (track.status, track.reason) == (TrackStatus.UNLOCKED, "no calibration for 160x120 images")
+
+
+def test_a_request_for_motion_waits_until_something_moves(measurement: PairMeasurement) -> None:
+    scene = view(0)
+    locked(measurement, measurement.edge(scene, scene), 1.0)
+    measurement.request_track(TrackRequest(8, 0.0, True, (math.nan, math.nan), motion=True))
+    tracks = []
+    for k in range(12):
+        shown = scene.copy()
+        x = 200 + 9 * max(k - 4, 0)
+        shown[200:290, x : x + 90] = scene[20:110, 300:390]
+        tracks.append(measurement.track(measurement.edge(shown, shown), 3.0 + k / 30, AT_REST, None))
+    assert {track.goal_id for track in tracks} == {8}
+    assert all(track.status is TrackStatus.LOST for track in tracks[:4])
+    assert all("waiting for something that moves" in track.reason for track in tracks[:4])
+    assert tracks[-1].status in (TrackStatus.OK, TrackStatus.AMBIGUOUS), tracks[-1].reason
+    assert tracks[-1].left_px == pytest.approx((200 + 9 * 7 + 45, 245), abs=20.0)
 
 
 def test_thresholds_of_verged_apply_from_the_next_pair_on(measurement: PairMeasurement, pair: EdgeMetricResult) -> None:

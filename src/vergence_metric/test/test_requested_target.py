@@ -286,3 +286,40 @@ def test_a_repeated_texture_is_ambiguous_and_names_its_distances():
     assert {track.status for track in tracks[3:]} == {TrackStatus.AMBIGUOUS}, tracks[-1]
     found = [disparity_px for disparity_px, _ in tracks[-1].candidates]
     assert sum(min(abs(d - 23 - 40 * k) for k in range(-4, 4)) < 2.0 for d in found) >= 2
+
+
+def shaded(seed):
+    """An image of strong shades that repeat along a row, with what tells the places apart only faintly drawn."""
+    columns = 60.0 * np.sin(2 * math.pi * np.arange(640) / 16.0)
+    return 128.0 + np.tile(columns, (480, 1)) + 4.0 * (texture(seed, (480, 640)) - 128.0) / 45.0
+
+
+def with_noise(image, seed):
+    noisy = image + 2.0 * np.random.default_rng(seed).standard_normal(image.shape)
+    return np.clip(noisy, 0, 255).astype(np.uint8)
+
+
+def test_a_place_that_explains_more_is_the_place_however_alike_the_others_are():
+    image = shaded(3)
+    eye = EyeView(CAMERA, 0.0, 0.0)
+    patch = RememberedPatch(with_noise(image, 1), eye, (320.0, 240.0))
+    moved = np.roll(image, (5, 9), axis=(0, 1))
+    found = patch.find(with_noise(moved, 2), eye, patch.direction, 40)
+    assert found is not None
+    np.testing.assert_allclose(found.pixel, (329.0, 245.0), atol=0.5)
+    assert found.spread_px <= 4.0
+
+
+def test_a_point_without_texture_stays_where_its_surroundings_are():
+    flat = texture(4, (480, 640))
+    flat[200:281, 280:361] = 128.0
+    left_view, right_view = views(AHEAD)
+    tracker = TargetTracker(TrackerParameters(), make_estimator(DisparityParameters()), CAMERA, Kinematics(RIG))
+    request = TrackRequest(5, 0.0, True, (320.0, 240.0))
+    first = StoredPair(0.0, with_noise(flat, 1), with_noise(flat, 2), (left_view, right_view))
+    tracker.update(first.left, first.right, 0.0, AHEAD)
+    tracker.request(request, first)
+    for i in range(1, 30):
+        left, right = with_noise(flat, 2 * i + 1), with_noise(flat, 2 * i + 2)
+        track = tracker.update(left, right, i * FRAME_S, AHEAD)
+        np.testing.assert_allclose(track.left_px, (320.0, 240.0), atol=2.0)

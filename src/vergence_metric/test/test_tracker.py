@@ -1,4 +1,4 @@
-"""The class-free tracker on rendered sequences: two textured boards and a wall, seen by eyes that turn."""
+"""The class-free trackers on rendered sequences: two textured boards and a wall, seen by eyes that turn."""
 
 import math
 
@@ -6,99 +6,16 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence_metric.disparity import make_estimator
-from vergence_metric.disparity.parameters import DisparityParameters
-from vergence_metric.tracking.parameters import TrackerParameters
+from vergence_metric.testing.rendered_boards import FRAME_S, Stage, gaze, true_pixel
+from vergence_metric.tracking.registry import tracker_names
 from vergence_metric.tracking.track import TrackStatus
-from vergence_metric.tracking.tracker import TargetTracker
-from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import EyeAngles, eye_position, gaze_for_point, rotation_rig_from_optical
-from vergence_rig.kinematics import Kinematics
-from vergence_rig.rig import default_rig
-
-RIG = default_rig()
-CAMERA = CameraModel(RIG.left_camera)
-FRAME_S = 1 / 30
-K = np.array([[539.0, 0, 319.5], [0, 539.0, 239.5], [0, 0, 1.0]])
+from vergence_rig.geometry import EyeAngles
 
 
-def texture(seed, shape, sigmas):
-    rng = np.random.default_rng(seed)
-    out = sum(cv2.GaussianBlur(rng.standard_normal(shape).astype(np.float32), (0, 0), s) * s for s in sigmas)
-    return np.clip(128 + 45 * (out - out.mean()) / out.std(), 0, 255).astype(np.float32)
-
-
-WALL = texture(1, (900, 1400), (2.0, 5.0, 12.0))
-TARGET, OTHER = texture(2, (96, 96), (3.0, 6.0)), texture(3, (96, 96), (3.0, 6.0))
-
-
-def board(image, surface, center_m, size_m, left, eyes, slant_rad=0.0):
-    """Draw a board that faces the head, its right side turned away by `slant_rad`; `size_m` is (width, height)."""
-    pan = eyes.pan_left_rad if left else eyes.pan_right_rad
-    per_px = np.array(size_m) / (surface.shape[1], surface.shape[0])
-    right, down = (
-        per_px[0] * np.array([math.sin(slant_rad), -math.cos(slant_rad), 0.0]),
-        np.array([0.0, 0.0, -per_px[1]]),
-    )
-    corner = np.array(center_m) - right * (surface.shape[1] - 1) / 2 - down * (surface.shape[0] - 1) / 2
-    columns = np.column_stack([right, down, corner - eye_position(left, RIG.baseline_m)])
-    homography = K @ rotation_rig_from_optical(pan, eyes.tilt_rad).T @ columns
-    cv2.warpPerspective(surface, homography, (640, 480), dst=image, borderMode=cv2.BORDER_TRANSPARENT)
-
-
-def pixel(point_m, left, eyes):
-    pan = eyes.pan_left_rad if left else eyes.pan_right_rad
-    ray = rotation_rig_from_optical(pan, eyes.tilt_rad).T @ (np.array(point_m) - eye_position(left, RIG.baseline_m))
-    return CAMERA.ray_to_pixel(ray[None])[0]
-
-
-class Stage:
-    """Shows frame after frame to a tracker and keeps what it says beside the truth."""
-
-    def __init__(self):
-        self.tracker = TargetTracker(
-            TrackerParameters(), make_estimator(DisparityParameters()), CAMERA, Kinematics(RIG)
-        )
-        self.frame, self.rng = 0, np.random.default_rng(0)
-        self.tracks, self.errors = [], []
-
-    def show(self, target_m, eyes, occluder_m=None, covered=(), slant_rad=0.0, joints=None):
-        """Show a frame; `joints` are the reported angles, if they differ from the true ones."""
-        images = []
-        for left in (True, False):
-            image = np.full((480, 640), 90, np.float32)
-            board(image, WALL, (3.0, 0.0, 0.0), (7.0, 4.5), left, eyes)
-            board(image, TARGET, target_m, (0.06, 0.06), left, eyes, slant_rad)
-            if occluder_m is not None:
-                board(image, OTHER, occluder_m, (0.08, 0.08), left, eyes)
-            if ("left" if left else "right") in covered:
-                image[:] = 15
-            image += 2.0 * cv2.randn(np.empty((480, 640), np.float32), 0, 1)
-            images.append(np.clip(image, 0, 255).astype(np.uint8))
-        track = self.tracker.update(images[0], images[1], self.frame * FRAME_S, joints or eyes)
-        true_left, true_right = pixel(target_m, True, eyes), pixel(target_m, False, eyes)
-        self.tracks.append(track)
-        self.errors.append(
-            (*(np.array(track.left_px) - true_left), track.disparity_px - (true_left[0] - true_right[0]))
-        )
-        self.frame += 1
-        return track
-
-    def lock(self, target_m, eyes):
-        for _ in range(12):
-            if self.show(target_m, eyes).status is TrackStatus.OK:
-                return self.tracks[-1]
-        raise AssertionError(f"no lock: {self.tracks[-1].status.name}, {self.tracks[-1].reason}")
-
-
-def gaze(point_m):
-    return gaze_for_point(np.array(point_m), RIG.baseline_m)
-
-
-@pytest.fixture
-def stage():
+@pytest.fixture(params=["remembered_patch", "corner_cluster"])
+def stage(request):
     cv2.setRNGSeed(1)
-    return Stage()
+    return Stage(request.param)
 
 
 def test_it_locks_on_what_lies_at_the_fovea_once_the_eyes_rest(stage):
@@ -130,10 +47,11 @@ def test_the_disparity_of_a_slanted_thing_is_that_of_the_point_that_was_looked_a
     for _ in range(20):
         track = stage.show(center, eyes, slant_rad=slant_rad)
     assert track.status is TrackStatus.OK, track.reason
-    # Its middle, where the track says that it is, has two pixels more of it.
-    truth = pixel(center, True, eyes) - pixel(center, False, eyes)
+    # Its middle, where the default's track says that it is, has two pixels more of it.
+    truth = true_pixel(center, True, eyes) - true_pixel(center, False, eyes)
     assert truth[0] > 1.9
-    assert abs(track.left_px[0] - pixel(center, True, eyes)[0]) < 3.0
+    place = center if stage.kind == "remembered_patch" else center + step
+    assert abs(track.left_px[0] - true_pixel(place, True, eyes)[0]) < 3.0
     assert track.disparity_px == pytest.approx(0.0, abs=0.4)
 
 
@@ -236,7 +154,7 @@ def test_a_saccade_to_another_thing_locks_anew(stage):
     assert TrackStatus.LOCKING in statuses
     assert track.status is TrackStatus.OK
     assert track.track_id == first.track_id + 1
-    assert np.abs(np.array(track.left_px) - pixel(other, True, goal)).max() < 3.0
+    assert np.abs(np.array(track.left_px) - true_pixel(other, True, goal)).max() < 3.0
 
 
 @pytest.mark.parametrize("hidden", [False, True])
@@ -247,7 +165,7 @@ def test_a_small_saccade_to_another_thing_locks_anew(stage, hidden):
     for _ in range(12):
         track = stage.show((5.0, -3.0, 0.0) if hidden else target, gaze(other), occluder_m=other)
     assert (track.status, track.track_id) == (TrackStatus.OK, first.track_id + 1)
-    assert np.abs(np.array(track.left_px) - pixel(other, True, gaze(other))).max() < 3.0
+    assert np.abs(np.array(track.left_px) - true_pixel(other, True, gaze(other))).max() < 3.0
 
 
 def test_a_saccade_towards_the_target_keeps_it(stage):
@@ -269,11 +187,9 @@ def test_a_saccade_towards_the_target_keeps_it(stage):
     assert np.abs(stage.errors[-1]).max() < 3.0
 
 
-def test_a_target_that_stays_away_is_given_up_until_the_next_saccade():
-    stage = Stage()
-    stage.tracker = TargetTracker(
-        TrackerParameters(give_up_s=0.3), make_estimator(DisparityParameters()), CAMERA, Kinematics(RIG)
-    )
+@pytest.mark.parametrize("kind", ["remembered_patch", "corner_cluster"])
+def test_a_target_that_stays_away_is_given_up_until_the_next_saccade(kind):
+    stage = Stage(kind, give_up_s=0.3)
     target = (0.8, 0.0, 0.0)
     stage.lock(target, gaze(target))
     for _ in range(14):
@@ -292,8 +208,9 @@ def test_time_that_jumps_back_starts_afresh(stage):
     assert stage.lock(target, gaze(target)).track_id == first.track_id + 1
 
 
-def test_a_blank_fovea_is_not_locked_on():
-    tracker = Stage().tracker
+@pytest.mark.parametrize("kind", [name for name in tracker_names() if name != "moving_target"])
+def test_a_blank_fovea_is_not_locked_on(kind):
+    tracker = Stage(kind).tracker
     blank = np.full((480, 640), 120, np.uint8)
     tracks = [tracker.update(blank, blank, k * FRAME_S, EyeAngles(0.0, 0.0, 0.0)) for k in range(10)]
     track = tracks[-1]

@@ -252,6 +252,29 @@ Groups = tuple[tuple[str, type[Parameters]], ...]
 """An executable's parameter groups: each class with the prefix of its names, such as ("disparity.", ...)."""
 
 
+def replaced_groups(
+    groups: Groups, values: Mapping[str, Any], current: Iterable[Parameters] | None = None
+) -> tuple[Parameters, ...]:
+    """Return one instance of every group, in their order, with some values changed by their full names.
+
+    `current` are the instances to begin with, those of the defaults if none. Raises ParameterError, with the full name,
+    for an unknown name or an invalid value.
+    """
+    known = {prefix + spec.name for prefix, kind in groups for spec in kind.specs()}
+    for name, value in values.items():
+        if name not in known:
+            raise UnknownParameterError(name, value, known)
+    begun = [kind() for _, kind in groups] if current is None else list(current)
+    changed = []
+    for (prefix, kind), group in zip(groups, begun, strict=True):
+        own = {spec.name: values[prefix + spec.name] for spec in kind.specs() if prefix + spec.name in values}
+        try:
+            changed.append(group.replaced(**own))
+        except ParameterError as error:
+            raise error.prefixed(prefix) from None
+    return tuple(changed)
+
+
 def renamed(groups: Groups) -> dict[str, tuple[str, ParameterSpec]]:
     """Return the former names of an executable's parameters, each with the new full name and its specification."""
     return {

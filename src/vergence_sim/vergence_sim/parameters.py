@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from vergence_rig.parameters import Groups, ParameterError, Parameters, UnknownParameterError, parameter
+from vergence_rig.parameters import Groups, ParameterError, Parameters, parameter, replaced_groups
 from vergence_sim.camera_parameters import CameraParameters, RightCameraParameters
 from vergence_sim.clock_parameters import ClockParameters
 from vergence_sim.heads import HeadParameters
+from vergence_sim.persons import PersonParameters
 
-TARGETS = ("cube", "marker", "straw", "cable", "stick")
+TARGETS = ("cube", "marker", "straw", "cable", "stick", "box")
 DISTRACTORS = ("two", "four", "five", "die", "plain", "stripes")
 MOTIONS = ("static", "step", "ramp", "sinusoid", "stations")
 _MOST_EXTRA_CUBES, _MOST_LOOK_ALIKES = 3, 6
@@ -215,6 +216,7 @@ GROUPS: Groups = (
     ("right_camera.", RightCameraParameters),
     ("target.", TargetParameters),
     ("motion.", MotionParameters),
+    ("persons.", PersonParameters),
 )
 
 NODE_GROUPS: Groups = (*GROUPS, ("clock.", ClockParameters))
@@ -246,6 +248,7 @@ class SimParameters:
     right_camera: RightCameraParameters = field(default_factory=RightCameraParameters)
     target: TargetParameters = field(default_factory=TargetParameters)
     motion: MotionParameters = field(default_factory=MotionParameters)
+    persons: PersonParameters = field(default_factory=PersonParameters)
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> "SimParameters":
@@ -259,17 +262,8 @@ class SimParameters:
 
     def replaced(self, values: Mapping[str, Any]) -> "SimParameters":
         """Return a validated copy with some values changed by their full names; raises ParameterError."""
-        known = {prefix + spec.name for prefix, group in GROUPS for spec in group.specs()}
-        for name, value in values.items():
-            if name not in known:
-                raise UnknownParameterError(name, value, known)
-        groups = []
-        for (prefix, kind), member in zip(GROUPS, fields(self), strict=True):
-            own = {spec.name: values[prefix + spec.name] for spec in kind.specs() if prefix + spec.name in values}
-            try:
-                groups.append(getattr(self, member.name).replaced(**own))
-            except ParameterError as error:
-                raise ParameterError(prefix + error.name, error.value, error.allowed) from None
+        current = (getattr(self, member.name) for member in fields(self))
+        groups: tuple[Any, ...] = replaced_groups(GROUPS, values, current)
         return SimParameters(*groups)
 
     def effective(self) -> "SimParameters":

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Sequence
 
+import cv2
 import mujoco
 import numpy as np
 
@@ -10,9 +11,11 @@ from vergence_rig.head_bodies import BASE, CAMERAS, EYES
 from vergence_rig.head_mjcf import camera_mjcf, mjcf_bodies
 from vergence_rig.rig import Rig
 from vergence_sim.memory import discard_pages, return_free_memory
-from vergence_sim.model_builder import HIDDEN_GROUP, ModelBuilder
+from vergence_sim.model_builder import FACES, HIDDEN_GROUP, ModelBuilder
 from vergence_sim.parameters import TARGETS, SimParameters
+from vergence_sim.persons import BOARD_HALF_M, PERSONS
 from vergence_sim.pictures import book_cover, cube_faces, look_alike_faces
+from vergence_sim.portraits import portrait
 from vergence_sim.room import Room
 from vergence_sim.surfaces import Image, cloth, shaded, wood
 from vergence_sim.true_gaze import fovea_sites
@@ -22,13 +25,15 @@ STAND = "stand"
 """The body that carries rig_base, and does not turn with it."""
 CUBE_SIDE_M = 0.057
 MARKER_LENGTH_M, MARKER_RADIUS_M = 0.14, 0.010
+BOX_SIDES_M = (0.07, 0.09, 0.11)
+"""Depth, width and height of the textured box."""
 THIN_LENGTH_M = 0.24
 THIN_WIDTHS_M = {"straw": 0.006, "cable": 0.011, "stick": 0.020}
 """Upright round targets whose images are 5 to 15 px wide within reach, by name."""
 EXTRA_CUBES = ("cube2", "cube3", "cube4")
 DISTRACTOR_SIDE_M = 0.06
-OBJECTS = (*TARGETS, "occluder", "distractor", *EXTRA_CUBES)
-"""Movable objects; the extra cubes only where the room has them."""
+OBJECTS = (*TARGETS, "occluder", "distractor", *EXTRA_CUBES, *PERSONS)
+"""Movable objects; extra cubes and persons only where the room has them."""
 
 
 class SceneBuilder(ModelBuilder):
@@ -49,7 +54,7 @@ class SceneBuilder(ModelBuilder):
         self._room.furnish()
 
     def targets(self) -> None:
-        """Add the Rubik's cube, the marker pen and an occluder: movable bodies."""
+        """Add the Rubik's cube, the marker pen, a textured box and an occluder: movable bodies."""
         half = CUBE_SIDE_M / 2
         cube = self._wrapped("cube", cube_faces(np.random.default_rng([self._seed, 2])))
         self.movable("cube", self.shape("box", (0, 0, 0), (half, half, half), cube, name="cube"))
@@ -63,6 +68,9 @@ class SceneBuilder(ModelBuilder):
                 "cylinder", (0, 0, 0.2 * length), (1.18 * radius, 0.02 * length), (0.9, 0.9, 0.88), name="marker_ring"
             ),
         )
+        covers = [book_cover(np.random.default_rng([self._seed, 12, face]), (256, 256)) for face in range(6)]
+        sides = (BOX_SIDES_M[0] / 2, BOX_SIDES_M[1] / 2, BOX_SIDES_M[2] / 2)
+        self.movable("box", self.shape("box", (0, 0, 0), sides, self._wrapped("box", covers), name="box"))
         board = [book_cover(np.random.default_rng([self._seed, 4, face]), (256, 256)) for face in range(6)]
         self.movable(
             "occluder",
@@ -133,6 +141,16 @@ class SceneBuilder(ModelBuilder):
             turn = (0.0, 0.0, float(rng.uniform(-0.7, 0.7)))
             self.add(self.shape("box", (x, y, z + side), (side, side, side), faces, turn, name))
 
+    def persons(self, count: int) -> None:
+        """Add boards with portraits on both sides, which stand for persons."""
+        for number, name in enumerate(PERSONS[:count]):
+            front = portrait(number, self._seed)
+            edge = np.full((8, 8, 3), 90, np.uint8)
+            sides = [front if face in ("right", "left") else edge for face in FACES]
+            squares = [cv2.resize(side, (256, 256), interpolation=cv2.INTER_AREA) for side in sides]
+            board = self._wrapped(name, [np.asarray(square, np.uint8) for square in squares])
+            self.movable(name, self.shape("box", (0, 0, 0), BOARD_HALF_M, board, name=name))
+
     def head(self, fovy_rad: tuple[float, float]) -> None:
         """The rig's head on a post: two pans on top of a tilt bar, a camera on each, all on a base that turns.
 
@@ -193,6 +211,7 @@ def _compiled(
     extra_cubes: int,
     look_alikes: int,
     distractor: str,
+    persons: int,
     textured: bool,
 ) -> mujoco.MjModel:
     builder = SceneBuilder(rig, seed, samples, textured)
@@ -200,6 +219,7 @@ def _compiled(
     builder.targets()
     builder.thin()
     builder.distractor(distractor)
+    builder.persons(persons)
     builder.crowd(extra_cubes, look_alikes)
     builder.furniture()
     builder.room()
@@ -234,5 +254,6 @@ def build_scene(
         world.extra_cubes,
         world.look_alikes,
         world.distractor,
+        parameters.persons.count,
         textured,
     )

@@ -15,6 +15,7 @@ from vergence_sim.memory import return_free_memory
 from vergence_sim.motion import offset_m
 from vergence_sim.optics import Lens, Sensor, motion_blurred
 from vergence_sim.parameters import TARGETS, SimParameters
+from vergence_sim.persons import PERSONS, person_place_m
 from vergence_sim.renderer import EyeRenderer
 from vergence_sim.scene import OBJECTS, STAND, build_scene, release_textures
 from vergence_sim.truth import GroundTruth, TrueBox, Truth
@@ -94,7 +95,7 @@ class Simulator:
             name: np.array([0.0, 0.3 * number, -5.0]) for number, name in enumerate(TARGETS)
         }
         self._places[start.object] = np.array([start.x_m, start.y_m, start.z_m])
-        self._motion_since_s = 0.0
+        self._motion_since_s = self._persons_since_s = 0.0
         self._update()
 
     def set_parameters(self, parameters: SimParameters) -> None:
@@ -103,6 +104,8 @@ class Simulator:
         target_changes = parameters.target.object != self.parameters.target.object
         if target_changes or parameters.motion != self.parameters.motion:
             self._motion_since_s = self.time_s
+        if parameters.persons != self.parameters.persons:
+            self._persons_since_s = self.time_s
         if target_changes:
             self._hide(self.parameters.target.object)
         self.parameters = parameters
@@ -148,7 +151,8 @@ class Simulator:
         """Place any movable object's centre in rig_base (3,) [m]; which one is the target stays as it is.
 
         Both targets, `occluder` (an upright board of 18 by 24 cm), `distractor` (a box 6 cm wide in the cube's
-        colours), and as many of `cube2`, `cube3`, `cube4` as `world.extra_cubes` says. Below the floor they are hidden.
+        colours), as many of `cube2`, `cube3`, `cube4` as `world.extra_cubes` says, and as many of `person1`, `person2`,
+        `person3` as `persons.count` says, which no longer move from then on. Below the floor they are hidden.
         """
         place = np.asarray(point_m, np.float64)
         if name not in OBJECTS or mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, name) < 0:
@@ -228,10 +232,20 @@ class Simulator:
         point = self._in_world(np.asarray(point_m, np.float64))
         return self._truth.angle_to_fovea("left", point), self._truth.angle_to_fovea("right", point)
 
+    def person_place_m(self, number: int) -> Array:
+        """Return where person `number`, from 0, is now (3,) in rig_base [m]."""
+        placed = self._places.get(PERSONS[number])
+        since_s = self.time_s - self._persons_since_s
+        return person_place_m(self.parameters.persons, number, since_s) if placed is None else placed
+
     def true_boxes(self, eye: str) -> list[TrueBox]:
-        """Return the true boxes of the targets and extra cubes in one eye's image, lens distortion included."""
+        """Return the true boxes of targets, extra cubes and persons in one eye's image, lens distortion included."""
         boxes = (self._truth.box(eye, name) for name in self._truth.objects)
         return [box for box in boxes if box is not None]
+
+    def true_box(self, eye: str, name: str) -> TrueBox | None:
+        """Return one target's, extra cube's or person's true box in an eye's image; None where none is inside."""
+        return self._truth.box(eye, name)
 
     def joint_states(self) -> dict[str, float]:
         """Return the joint angles [rad] as a driver of servos without position feedback reports them."""
@@ -272,6 +286,9 @@ class Simulator:
             if name in TARGETS:
                 half = 0.5 * self.parameters.target.yaw_rad
                 data.mocap_quat[self._mocap(name)] = (math.cos(half), 0.0, 0.0, math.sin(half))
+        for number, name in enumerate(PERSONS[: self.parameters.persons.count]):
+            if name not in self._places:
+                data.mocap_pos[self._mocap(name)] = self._in_world(self.person_place_m(number))
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_camlight(self._model, data)
 

@@ -13,6 +13,7 @@ from vergence_rig.head_bodies import BASE, EYES, TILT
 from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_sim.optics import Lens
 from vergence_sim.parameters import TARGETS
+from vergence_sim.persons import PERSON_CLASS, PERSONS
 from vergence_sim.scene import EXTRA_CUBES
 from vergence_sim.true_gaze import TrueGaze
 
@@ -75,7 +76,7 @@ class GroundTruth:
                 for i in range(model.ngeom)
                 if model.geom_bodyid[i] == mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
             ]
-            for name in (*TARGETS, *EXTRA_CUBES)
+            for name in (*TARGETS, *EXTRA_CUBES, *PERSONS)
         }
         self._geoms = {name: geoms for name, geoms in self._geoms.items() if geoms}
         self._hit = np.zeros(1, np.int32)
@@ -83,7 +84,7 @@ class GroundTruth:
 
     @property
     def objects(self) -> tuple[str, ...]:
-        """Names of the objects that have boxes: the targets and extra cubes, visible or not."""
+        """Names of the objects that have boxes: targets, extra cubes and persons, visible or not."""
         return tuple(self._geoms)
 
     def target_point_world(self, target: str) -> Array:
@@ -142,7 +143,7 @@ class GroundTruth:
         if high[0] < 0 or high[1] < 0 or low[0] > width - 1 or low[1] > height - 1:
             return None
         return TrueBox(
-            "cube" if target in EXTRA_CUBES else target,
+            _class_of(target),
             float(max(low[0], 0)),
             float(max(low[1], 0)),
             float(min(high[0], width - 1)),
@@ -288,3 +289,9 @@ class GroundTruth:
             if 0 <= distance < nearest:
                 nearest = float(distance)
         return nearest
+
+
+def _class_of(name: str) -> str:
+    if name in EXTRA_CUBES:
+        return "cube"
+    return PERSON_CLASS if name in PERSONS else name

@@ -23,6 +23,7 @@ from vergence_rig.finding import Finding
 from vergence_rig.install_hint import install_hint
 
 _PACKAGES = {
+    "aiohttp": ("python3-aiohttp", "aiohttp"),
     "numpy": ("python3-numpy", "numpy"),
     "cv2": ("python3-opencv", "opencv-python-headless"),
     "yaml": ("python3-yaml", "PyYAML"),
@@ -85,10 +86,13 @@ def _python() -> Iterable[Finding]:
     for module, (apt, pip) in _PACKAGES.items():
         found = importlib.util.find_spec(module) is not None
         yield Finding(f"python package {module}", found, "installed" if found else "missing", package_hint(apt, pip))
-    found = importlib.util.find_spec("onnxruntime") is not None
-    message = "onnxruntime is installed" if found else "onnxruntime is not installed"
-    remedy = f"{install_hint('onnxruntime')}; only box_metric_node needs it"
-    yield Finding("detector", found, message, remedy, needed=False)
+    for name, module, user in (
+        ("detector", "onnxruntime", "box_metric_node needs"),
+        ("recordings", "rosbags", "vergence record and replay need"),
+    ):
+        found = importlib.util.find_spec(module) is not None
+        message = f"{module} is installed" if found else f"{module} is not installed"
+        yield Finding(name, found, message, f"{install_hint(module)}; only {user} it", needed=False)
 
 
 def _compiler() -> Iterable[Finding]:

@@ -7,11 +7,23 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vergence_bringup.machine import build_hint
+from vergence_rig.face_model import (
+    FACE_CLASS,
+    FACE_HINT,
+    FACE_MODEL,
+    FACE_MODEL_BYTES,
+    FACE_MODEL_SHA256,
+    is_face_model,
+)
 from vergence_rig.finding import Finding
 from vergence_rig.middleware import middleware_problem
 from vergence_rig.printed import printed_line
+
+if TYPE_CHECKING:
+    from vergence_metric.boxes.detector import Detector
 
 SHM = Path("/dev/shm")
 SEGMENT_BYTES = 16 << 20
@@ -98,6 +110,25 @@ def rig_files(rig: str, servos: str, backend: str, model: str) -> Iterable[Findi
         yield _opened("servos", servos, lambda: _open_servos(servos, backend))
     if model:
         yield _opened("detector's model", model, lambda: _load_model(model))
+    yield _faces(model)
+
+
+def _faces(model: str) -> Finding:
+    """Return whether a goal for a face can be met: whether the detector, "" for the shipped one, has that class."""
+    where = f"{FACE_MODEL}: {FACE_MODEL_BYTES} bytes, MIT licence, SHA-256 {FACE_MODEL_SHA256}; then --model FILE"
+    try:
+        if model and is_face_model(model):
+            return Finding("faces", True, f"{model} is YuNet of the OpenCV Zoo", needed=False)
+        found = bool(model) and FACE_CLASS in _detector(model).class_names
+    except (ModuleNotFoundError, ValueError, OSError) as error:
+        return Finding("faces", False, f"{FACE_HINT}: {printed_line(error)}", where, needed=False)
+    if found:
+        text = f"{model} detects faces; it is not {FACE_MODEL}, whose SHA-256 is {FACE_MODEL_SHA256}"
+        return Finding("faces", True, text, needed=False)
+    which = model or "the shipped detector"
+    return Finding(
+        "faces", False, f"{which} detects none, and a goal for a face fails: {FACE_HINT}", where, needed=False
+    )
 
 
 def _opened(name: str, what: str, opened: Callable[[], str]) -> Finding:
@@ -132,7 +163,11 @@ def _open_servos(path: str, backend: str) -> str:
 
 
 def _load_model(path: str) -> str:
+    return _detector(path).describe()
+
+
+def _detector(path: str) -> "Detector":
     from vergence_metric.boxes.detector import Detector
     from vergence_metric.boxes.parameters import DetectorParameters
 
-    return Detector(DetectorParameters(model=path)).describe()
+    return Detector(DetectorParameters(model=path))

@@ -48,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("VERSION", "VERGENCE", "TILT"),
         help="angles that are added to the present ones [degrees]",
     )
+    target.add_argument("--motion", action="store_true", help="whatever moves next in the left image")
     parser.add_argument("--eye", choices=("left", "right"), default="left", help="eye of --pixel (default: left)")
     parser.add_argument("--depth", type=_positive, metavar="M", help="distance along the eye's ray of --pixel [m]")
     parser.add_argument("--frame", default="rig_base", help="frame of --point (default: %(default)s)")
@@ -82,6 +83,8 @@ def look_request(options: argparse.Namespace) -> LookRequest:
         x, y, z = options.point
         text = f"point ({x:g}, {y:g}, {z:g}) m in {options.frame}"
         return LookRequest("POINT", text, {}, (x, y, z), options.frame)
+    if options.motion:
+        return LookRequest("MOTION", "whatever moves next", {})
     relative = options.turn is not None
     angles = options.turn if relative else options.angles
     version, vergence, tilt = angles

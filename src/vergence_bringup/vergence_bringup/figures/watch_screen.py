@@ -1,39 +1,14 @@
 """The screen of `vergence watch`: lines of text from the newest messages."""
 
 import math
-from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
-_RATE_WINDOW_S = 3.0
+from vergence_rig.stream import Stream
+
 _STALE_S = 1.0
 _COLOURS = {"good": "32", "warn": "33", "bad": "31", "dim": "2", "bold": "1"}
 _LEVELS = {0: ("ok", "good"), 1: ("warn", "warn"), 2: ("ERROR", "bad"), 3: ("stale", "warn")}
-
-
-@dataclass
-class Stream:
-    """One topic: the newest message, its arrival, and the arrivals of the last seconds (monotonic s)."""
-
-    message: Any = None
-    arrived_s: float = -math.inf
-    count: int = 0
-    _arrivals_s: deque[float] = field(default_factory=lambda: deque(maxlen=512))
-
-    def add(self, message: Any, now_s: float) -> None:
-        """Store a message that arrived at `now_s`."""
-        self.message, self.arrived_s = message, now_s
-        self.count += 1
-        self._arrivals_s.append(now_s)
-
-    def rate_hz(self, now_s: float) -> float:
-        """Return the rate of messages over the last 3 s; 0 if there were none."""
-        while self._arrivals_s and now_s - self._arrivals_s[0] > _RATE_WINDOW_S:
-            self._arrivals_s.popleft()
-        if len(self._arrivals_s) < 2:
-            return 0.0
-        return (len(self._arrivals_s) - 1) / max(self._arrivals_s[-1] - self._arrivals_s[0], 1e-9)
 
 
 @dataclass(frozen=True)
@@ -76,6 +51,8 @@ class Screen:
         style = "" if snapshot.now_s - stream.arrived_s < _STALE_S else "dim"
         judged = ("good", "verged") if state.verged else ("warn", "not verged")
         yield ((style or "bold", f"  {state.phase_name:<8} "), judged, (style, f"  {state.reason}"))
+        if state.attention not in ("", "disabled"):
+            yield ((style, f"  attention {state.attention}"),)
         residuals = (state.version_residual_rad, state.vergence_residual_rad, state.tilt_residual_rad)
         yield (
             (style, f"  version {_degrees(state.version_rad)}  vergence {_degrees(state.vergence_rad)}"),

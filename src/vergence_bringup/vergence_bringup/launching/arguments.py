@@ -81,11 +81,18 @@ _NAMESPACE = LaunchArgument("namespace", "namespace of all nodes of the head")
 _RIG = _file("rig", "path of rig.yaml", shipped="rig.yaml")
 _PROFILE = _file("fastdds_profile", "Fast DDS profile", shipped="fastdds.xml")
 _ENCODER = _switch("encoder", "run eye_rotation_node, the visual encoder of the eyes' angles", "true")
+_ATTEND = _switch("attend", "look at people, and what else is of interest, while no goal is active", "false")
 _FRAMES = LaunchArgument(
     "frames",
     "run robot_state_publisher, which publishes the head's frames on tf; auto: where it is installed",
     "auto",
     ("auto", "true", "false"),
+)
+_WEB = (
+    _switch("web", "run web_node, the page of the head for browsers, at http://localhost:8470", "false"),
+    LaunchArgument(
+        "web_address", "address that the page listens on; 0.0.0.0 for other machines, which need its token", "127.0.0.1"
+    ),
 )
 _RANGE = LaunchArgument(
     "discovery_range",
@@ -105,12 +112,14 @@ _CAMERAS_AND_VISION = (
     _file("identified", "path of rig.nodes.yaml, written by vergence identify"),
     _switch("detector", "run box_metric_node; it needs onnxruntime", "false"),
     _file("model", "ONNX file of the detector; empty for the one of the simulator's cube"),
+    _ATTEND,
     _switch("lock", "hold one exposure and white balance for both cameras", "true"),
     _switch(
         "composed", "run all nodes in one process, head_node: images pass in memory, which saves CPU time", "false"
     ),
     _ENCODER,
     _FRAMES,
+    *_WEB,
     _PROFILE,
 )
 
@@ -129,8 +138,10 @@ ARGUMENTS: dict[str, tuple[LaunchArgument, ...]] = {
         _switch(
             "detector", "run box_metric_node, whose detector finds the simulator's cube; needs onnxruntime", "true"
         ),
+        _ATTEND,
         _ENCODER,
         _FRAMES,
+        *_WEB,
         _switch(
             "use_sim_time",
             "simulated time: sim_node publishes /clock, which waits for the nodes that follow it",

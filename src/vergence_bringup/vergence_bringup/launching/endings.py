@@ -10,6 +10,7 @@ OPTIONAL = {
     "box_metric_node": "metric II and goals by class",
     "eye_rotation_node": "the visual encoder of the eyes' angles",
     "robot_state_publisher": "the head's frames on tf",
+    "web_node": "its page",
 }
 """The nodes without which a head still verges, and what it lacks then."""
 

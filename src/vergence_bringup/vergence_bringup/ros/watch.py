@@ -19,12 +19,13 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, JointState
 
-from vergence_bringup.figures.watch_screen import Screen, Snapshot, Stream
+from vergence_bringup.figures.watch_screen import Screen, Snapshot
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_common.stamps import to_seconds
 from vergence_common.start import checked_namespace, init
 from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, VergenceError
 from vergence_rig.rig_file import load_rig
+from vergence_rig.stream import Stream
 
 # camera_info is published with every image and is cheap: it shows whether images arrive.
 _TOPICS: dict[str, tuple[Any, Any]] = {

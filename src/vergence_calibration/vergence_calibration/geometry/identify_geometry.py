@@ -27,6 +27,7 @@ from vergence_rig.rig import JOINT_NAMES, Rig
 
 Array = npt.NDArray[np.float64]
 
+_STEP_SIGMAS = 0.1  # by which each unknown is changed for a derivative
 _NEIGHBOURS = 10
 _LEARNT = 0.7  # of the prior's standard deviation: what remains more uncertain was not seen
 _LEAST_JOINT_SIGMA_RAD = math.radians(0.02)
@@ -101,20 +102,20 @@ def identify_geometry(
     Raises:
         IdentifyError: limits too close together, a scene with too little texture or depth, or one that moves.
     """
-    planned = planned_poses(rig, parameters)
+    first, *planned = planned_poses(rig, parameters)
     progress(f"geometry: looking from {len(planned)} poses")
     cameras = head.cameras()
+    look = head.look(first)
+    cameras = {eye: _sized(cameras[eye], look.sizes_px[eye], eye) for eye in EYES}
     found: list[Features] = []
-    joints_rad = []
-    for number, pose in enumerate(planned):
+    joints_rad = [[float(angle) for angle in look.joints_rad]]
+    for pose in planned:
         look = head.look(pose)
-        if number == 0:
-            cameras = {eye: _sized(cameras[eye], look.sizes_px[eye], eye) for eye in EYES}
         joints_rad.append([float(angle) for angle in look.joints_rad])
         found += [features(look.pictures[eye]) for eye in EYES]
         scales = [look.sizes_px[eye][0] / look.pictures[eye].shape[1] for eye in EYES]
     check_texture(found)
-    poses = visited(rig, joints_rad, joints_rad[0])
+    poses = visited(rig, joints_rad[1:], joints_rad[0])
     seen = _in_whole_images(_tracked(found, rig, cameras, poses), scales, cameras)
     check_sightings(seen, len(found))
     progress(f"  {int(seen.point.max()) + 1} things found again from several poses, {len(seen.view)} sightings")
@@ -151,7 +152,7 @@ def solved(
     sigmas = np.sqrt(np.diag(solution.covariance))
     check_certain(sigmas)
     return FoundGeometry(
-        replace(rig_of(rig, solution.vector[: len(NAMES)], cameras), zero_sigma_rad=_zero_sigma_rad(solution)),
+        replace(rig_of(rig, solution.vector[: len(NAMES)], cameras), zero_sigma_rad=_pan_sigma_rad(views, solution)),
         cameras,
         solution.vector[: len(NAMES)],
         sigmas,
@@ -223,8 +224,23 @@ def _joint_sigmas(solution: Solution) -> Array:
     return np.maximum(np.sqrt((deviations**2).sum(axis=0) / (len(deviations) - 3)), _LEAST_JOINT_SIGMA_RAD)
 
 
-def _zero_sigma_rad(solution: Solution) -> float:
-    """Return the standard deviation of each pan's zero that gives that of their difference, the vergence [rad]."""
-    places = [index("zero_rad", eye) for eye in EYES]
-    own = solution.covariance[np.ix_(places, places)]
-    return round(math.sqrt(0.5 * float(own[0, 0] + own[1, 1] - 2.0 * own[0, 1])), 6)
+def _pan_sigma_rad(views: HeadViews, solution: Solution) -> float:
+    """Return the standard deviation of each pan that gives that of the vergence, over all poses [rad].
+
+    The vergence is that of the rays of two pixels, which zeros, scales and principal points turn alike.
+    """
+    principal = solution.vector[[[index(name, eye) for name in ("cx_px", "cy_px")] for eye in EYES]]
+    views_at = np.arange(views.count)
+    seen = Observations(views_at, np.zeros_like(views_at), np.tile(principal, (views.count // 2, 1)))
+    rays = views.rays(solution.vector, seen)
+    across = np.cross((0.0, 0.0, 1.0), rays)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    turns = np.zeros((len(NAMES), views.count))
+    for place, step in enumerate(_STEP_SIGMAS * np.sqrt(np.diag(solution.covariance))):
+        if step > 0.0:
+            vector = solution.vector.copy()
+            vector[place] += step
+            turns[place] = np.einsum("vi,vi->v", views.rays(vector, seen) - rays, across) / step
+    vergences = turns[:, 1::2] - turns[:, ::2]
+    variances = np.einsum("gp,gh,hp->p", vergences, solution.covariance, vergences)
+    return round(math.sqrt(0.5 * float(variances.mean())), 6)

@@ -32,7 +32,9 @@ class PoseParameters(Parameters):
 
 
 def planned_poses(rig: Rig, parameters: PoseParameters) -> list[dict[str, float]]:
-    """Return joint angles [rad] by name, in the order in which they are visited.
+    """Return joint angles [rad] by name, in the order in which they are visited; one more than `parameters.poses`.
+
+    The first pose only settles from which side the joints arrive at the second one.
 
     Raises:
         IdentifyError: limits too close together.
@@ -60,7 +62,7 @@ def planned_poses(rig: Rig, parameters: PoseParameters) -> list[dict[str, float]
                 f"{(high - low) / _DEG:.1f}"
             )
     planned = []
-    for k in range(parameters.poses):
+    for k in range(-1, parameters.poses):
         v, g, t = (_between(ends, k / period) for ends, period in zip((version, vergence, tilt), _PERIODS, strict=True))
         joints = rig.joint_angles((v - 0.5 * g, v + 0.5 * g, t))
         planned.append(dict(zip(JOINT_NAMES, joints, strict=True)))

@@ -7,16 +7,30 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from vergence_gaze.attention.attending import Attending
+from vergence_gaze.attention_parameters import DISABLED
 from vergence_gaze.control.perception import LATEST_FUTURE_S, Perception
 from vergence_gaze.control.report import Command, GazeReport, make_report
-from vergence_gaze.control.search_pattern import Searcher
+from vergence_gaze.control.search_pattern import Searcher, SearchPattern
 from vergence_gaze.control.track_requests import TrackRequests
 from vergence_gaze.estimation.mount_drift import MountDrift
-from vergence_gaze.estimation.observations import JointReport, JointResolution, Observation, PointSighting
+from vergence_gaze.estimation.observations import (
+    BoxSighting,
+    JointReport,
+    JointResolution,
+    Observation,
+    PointSighting,
+)
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
-from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
+from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, ObjectRequest, Result, TrackRequest
 from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
-from vergence_gaze.goals.goal_resolution import ClassRequest, RequestedPose, resolve_goal
+from vergence_gaze.goals.goal_resolution import (
+    ClassRequest,
+    MotionRequest,
+    RequestedPose,
+    RequestedTarget,
+    resolve_goal,
+)
 from vergence_gaze.joints.feedback import FeedbackMonitor
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.joint_reports import in_eye_angles
@@ -57,6 +71,7 @@ class GazeController:
         self._beyond_limits = False
         self._feedback = FeedbackMonitor()
         self._perception = Perception(rig, parameters, _driven(parameters))
+        self._attention = Attending(rig, parameters)
         self._configure(parameters)
         self._active = self._verges_on_sight = parameters.control.start == "verge"
 
@@ -67,8 +82,10 @@ class GazeController:
         self._phases = PhaseMachine(parameters)
         self._requests = TrackRequests(self._perception, parameters)
         self._law = make_law(rig, parameters)
+        self._attention.configure(rig, parameters)
+        tilts, vergence_rad = parameters.control.tilt_enabled, parameters.target.prior_vergence_rad
         self._searcher = Searcher(
-            rig, parameters.control.tilt_enabled, parameters.target.prior_vergence_rad, parameters.search.dwell_s
+            lambda: SearchPattern(rig, tilts, vergence_rad), vergence_rad, parameters.search.dwell_s
         )
         self._lead_s = max(joint.servo.command_latency_s for _, joint in rig.joints.items()) + 0.5 * self._period_s
 
@@ -89,8 +106,8 @@ class GazeController:
 
     @property
     def uses_images(self) -> bool:
-        """True while the eyes are turned by what the images show, False while they hold still or go to an angle."""
-        return self._active and self._pose is None
+        """True while what the images show turns the eyes, or may: not while they hold still or go to an angle."""
+        return (self._active and self._pose is None) or self._attention.policy != DISABLED
 
     @property
     def goal_id(self) -> int | None:
@@ -108,6 +125,10 @@ class GazeController:
         """
         return point_in_rig(point_m, frame, stamp_s, self._perception.history, self._perception.kinematics)
 
+    def check(self, goal: Goal, now_s: float) -> None:
+        """Raise GoalError for a goal that cannot be started now; nothing changes."""
+        self._resolved(goal, now_s)
+
     def look_at(self, goal: Goal, now_s: float) -> int:
         """Start a goal and return its id; the active one ends as PREEMPTED.
 
@@ -115,10 +136,7 @@ class GazeController:
         """
         goal_id = self._goals.new_id()
         try:
-            if not self._enabled:
-                raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
-            kinematics, history = self._perception.kinematics, self._perception.history
-            request = resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
+            request = self._resolved(goal, now_s)
         except GoalError as error:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
@@ -130,12 +148,16 @@ class GazeController:
         self._law.reset()
         self._searcher.stop()
         tracking = self._perception.tracking
-        self._requests.free()
+        self._free_requests()
         if isinstance(request, RequestedPose):
             tracking.clear()
             self._pose = np.where(self._driven, request.joints_rad, np.nan)
         elif isinstance(request, ClassRequest):
             tracking.request_class(request.class_name, goal_id)
+            self._requests.ask_object(ObjectRequest(request.class_name))
+        elif isinstance(request, MotionRequest):
+            tracking.request_motion(goal_id)
+            self._requests.ask(TrackRequest(goal_id, motion=True))
         else:
             start = now_s, request.stamp_s, request.angles_rad, request.covariance, goal_id
             if goal.kind is GoalKind.POINT:
@@ -143,9 +165,15 @@ class GazeController:
             else:
                 tracking.request_target(*start)
                 xy = goal.left_xy if goal.left_eye else goal.right_xy
-                self._requests.ask(TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy))
+                self._requests.ask(TrackRequest(goal_id, request.stamp_s, goal.left_eye, xy, goal.extent_rad))
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
+
+    def _resolved(self, goal: Goal, now_s: float) -> RequestedTarget | RequestedPose | ClassRequest | MotionRequest:
+        if not self._enabled:
+            raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
+        kinematics, history = self._perception.kinematics, self._perception.history
+        return resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
 
     def cancel(self, now_s: float, goal_id: int | None = None) -> bool:
         """End the active goal (or only if it is `goal_id`) as CANCELLED and hold still; False if there is none."""
@@ -158,20 +186,30 @@ class GazeController:
     def stop(self, now_s: float) -> None:
         """End any goal and hold still where the eyes are."""
         self._goals.end(Result.CANCELLED, "stopped on request", now_s)
+        self._attention.pause()
         self._hold("stopped on request", now_s)
 
+    def set_attention(self, policy: str, now_s: float) -> None:
+        """Set the policy of attention without a goal, one of attention_parameters.POLICIES; it ends a stop."""
+        engaged = self._attention.engaged
+        self._attention.set_policy(policy)
+        if engaged and not self._attention.engaged:
+            self._hold("attention is disabled", now_s)
+
     def enable(self, enabled: bool, now_s: float) -> None:
-        """Disable: hold still and send nothing. Enable: without a goal, verge on what the left eye sees."""
+        """Disable: hold still and send nothing. Enable: without a goal, attend, or verge on what the left eye sees."""
         self._enabled = enabled
         if not enabled:
             self._goals.end(Result.CANCELLED, "disabled: the eyes hold still, no commands are sent", now_s)
             self._hold("disabled: the eyes hold still, no commands are sent", now_s)
             self._send_until_s = -math.inf
+        elif self._attention.policy != DISABLED:
+            self._attention.resume()
         elif not self._active:
             self._activate(now_s)
             self._verges_on_sight = True
             self._perception.tracking.clear()
-            self._requests.free()
+            self._free_requests()
 
     def step(self, now_s: float, observations: Iterable[Observation] = (), joint_fault: str = "") -> Command:
         """Update by what arrived since the last cycle and return what to command now.
@@ -190,8 +228,10 @@ class GazeController:
         command = self._command
         if command is None or not sending:
             command = self._start_from_joints(now_s)
+        if not self._fault(now_s):
+            self._attend(now_s)
         desired = self._decide(now_s, command) if self._active else self._rest
-        sent = self._limits.limited(desired, command, now_s - self._command_s, self._perception.history.reported_rad)
+        sent = self._present_limits.limited(desired, command, now_s - self._command_s, history.reported_rad)
         self._note_limits(desired)
         self._command, self._command_s = sent, max(now_s, self._command_s)
         if sending:
@@ -199,11 +239,13 @@ class GazeController:
         if not fault:
             self._update_goal(now_s)
         joints_rad = np.array(self._described.joint_angles(sent.tolist())) if sending else None
-        return Command(joints_rad, self._report(now_s), self._goals.pop_outcomes(), self._requests.pop())
+        outcomes, requests = self._goals.pop_outcomes(), self._requests
+        return Command(joints_rad, self._report(now_s), outcomes, requests.pop(), requests.pop_object())
 
     def rests(self, now_s: float) -> bool:
         """Return whether a step would command nothing and end no goal: `observe` is then enough in most cycles."""
-        return not (self._active or now_s < self._send_until_s or self._goals.has_outcomes)
+        busy = self._active or now_s < self._send_until_s or self._goals.has_outcomes
+        return not busy and self._attention.policy == DISABLED
 
     def observe(self, observations: Iterable[Observation], now_s: float) -> None:
         """Update by what has arrived, as `step` does.
@@ -213,6 +255,7 @@ class GazeController:
         if now_s < self._command_s - _CLOCK_JUMP_S:
             self._perception.on_clock_reset()
             self._feedback.clear()
+            self._attention.restart()
             self._command_s = now_s
             self._restart("the clock was set back", self._p, now_s)
         for observation in observations:
@@ -226,6 +269,41 @@ class GazeController:
         self._command_s = now_s
         return command
 
+    @property
+    def _present_limits(self) -> CommandLimits:
+        return self._attention.limits if self._attention.engaged else self._limits
+
+    def _attend(self, now_s: float) -> None:
+        """Look at what attention wants while nothing else is asked for."""
+        tracking, attention = self._perception.tracking, self._attention
+        streams = tracking.follows_stream and self._perception.unseen_s(now_s) <= self._p.target.lost_after_s
+        asked = streams or self._goals.goal_id is not None
+        searching = self._phases.phase is Phase.SEARCH
+        if not attention.update(now_s, asked, searching, self._enabled, self._perception.judge.verged):
+            return
+        self._activate(now_s)
+        focus = attention.focus
+        if focus is None:
+            tracking.clear()
+            self._free_requests()
+            self._phases.enter(Phase.LOST, attention.describe(), now_s)
+        else:
+            self._requests.ask_object(ObjectRequest(focus.class_name, focus.object_id))
+            if tracking.class_name != focus.class_name or focus.object_id not in (0, tracking.object_id):
+                self._turn_to(focus.class_name, focus.object_id, focus.reason, now_s)
+
+    def _turn_to(self, class_name: str, object_id: int, reason: str, now_s: float) -> None:
+        """Start again with an object of a class, this one if an id is given, on behalf of the same goal or of none."""
+        self._perception.tracking.request_class(class_name, self._goals.new_id(), object_id)
+        self._requests.free()
+        self._perception.judge.restart(reason)
+        self._law.reset()
+        self._phases.enter(Phase.VERGE, reason, now_s)
+
+    def _free_requests(self) -> None:
+        self._requests.free()
+        self._requests.ask_object(ObjectRequest())
+
     def _observe(self, observation: Observation, now_s: float) -> None:
         if isinstance(observation, JointResolution):
             self._set_steps(observation)
@@ -233,6 +311,11 @@ class GazeController:
         if isinstance(observation, JointReport):
             observation = in_eye_angles(observation, self._described)
         known = self._perception.history.known and observation.stamp_s <= now_s + LATEST_FUTURE_S
+        if isinstance(observation, BoxSighting):
+            self._attention.observe(observation, now_s)
+            if known and self._perception.tracking.is_another(observation):
+                reason = f"object {observation.object_id} is the target now"
+                self._turn_to(self._perception.tracking.class_name or "", 0, reason, now_s)
         if isinstance(observation, PointSighting) and known and self._goals.goal_id is None and self._enabled:
             self._follow_stream(now_s)
         verging = self._phases.phase in (Phase.VERGE, Phase.FIXATE)
@@ -253,13 +336,14 @@ class GazeController:
             self._command = np.array(rig.eye_angles(self._described.joint_angles(self._command.tolist())))
         self._described, self._rig = rig, rig.in_eye_angles()
         self._limits = CommandLimits(self._rig)
+        self._attention.configure(self._rig, self._p)
         self._perception.set_rig(self._rig)
         self._law = make_law(self._rig, self._p)
 
     def _follow_stream(self, now_s: float) -> None:
         if not self._perception.tracking.follows_stream:
             self._perception.tracking.request_stream()
-            self._requests.free()
+            self._free_requests()
             self._perception.judge.restart("the target is a stream of points")
             self._activate(now_s)
 
@@ -282,9 +366,13 @@ class GazeController:
         resting = situation.eyes_still and situation.residual_rad <= self._p.saccade.threshold_rad
         self._requests.ask_at_point(resting, now_s)
         if phase is Phase.SEARCH:
-            place = self._searcher.next_pose(now_s, self._perception.history.shaft_rad, self._limits.speed_rad_s)
+            shaft_rad = self._perception.history.shaft_rad
+            if self._attention.engaged:
+                place = self._attention.next_pose(now_s, shaft_rad)
+            else:
+                place = self._searcher.next_pose(now_s, shaft_rad, self._limits.speed_rad_s)
             return np.where(self._driven, place, np.nan)
-        self._searcher.stop()
+        self._stop_searching()
         if phase in (Phase.LOST, Phase.IDLE):
             self._perception.judge.restart("the target is lost")
             return _UNKNOWN
@@ -299,11 +387,15 @@ class GazeController:
     def _wait(self, now_s: float) -> Array:
         """Let the joints stay where they were sent: during a fault nothing is searched, pursued or verged on."""
         fault = self._fault(now_s)
-        self._searcher.stop()
+        self._stop_searching()
         self._law.reset()
         self._perception.judge.restart(fault)
         self._phases.enter(Phase.LOST, fault, now_s)
         return _UNKNOWN
+
+    def _stop_searching(self) -> None:
+        self._searcher.stop()
+        self._attention.stop_searching()
 
     def _control_input(self, now_s: float, command: Array) -> ControlInput:
         return ControlInput(
@@ -316,7 +408,7 @@ class GazeController:
             shaft_rad=self._perception.history.shaft_rad,
             commanded_rad=command,
             driven=self._driven,
-            speed_rad_s=self._limits.speed_rad_s,
+            speed_rad_s=self._present_limits.speed_rad_s,
             lead_s=self._lead_s,
             half_play_rad=self._perception.history.half_play_rad,
         )
@@ -338,11 +430,14 @@ class GazeController:
             eyes_still=self._perception.eyes_still(state.now_s, state.commanded_rad, self._law.lands_at_rest),
             travel_s=float((np.abs(residual) / state.speed_rad_s).max()),
             verged=self._perception.judge.verged,
-            # Without images there is nothing to be found in them; a stream of points needs none.
+            # Without images there is nothing to be found in them; a stream of points needs none. What moves is waited
+            # for: eyes that turn see less of it.
             may_search=tracking.follows_stream
             or (
                 not self._perception.images_missing(state.now_s)
+                and not tracking.awaits_motion
                 and (tracking.class_name is not None or lost_s > self._p.search.after_s)
+                and (self._attention.may_search or not self._attention.engaged)
             ),
         )
 
@@ -398,8 +493,9 @@ class GazeController:
 
     def _report(self, now_s: float) -> GazeReport:
         law, mode = self._law.name, self._p.control.mode
+        attention, needed = self._attention.describe(), self.uses_images
         fault = self._fault(now_s)
-        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, fault, self.uses_images)
+        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, fault, attention, needed)
 
 
 def _driven(parameters: GazeParameters) -> npt.NDArray[np.bool_]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from vergence_gaze.control.perception import Perception
 from vergence_gaze.estimation.distance import TargetPosition
 from vergence_gaze.estimation.target_filter import TargetEstimate
-from vergence_gaze.goals.goal import Outcome, TrackRequest
+from vergence_gaze.goals.goal import ObjectRequest, Outcome, TrackRequest
 from vergence_gaze.phases import Phase, PhaseMachine
 from vergence_rig.geometry import EyeAngles, GeometryError
 from vergence_rig.kinematics import Kinematics
@@ -25,7 +25,8 @@ class GazeReport:
     """Angles are estimated, residuals (version, vergence, tilt) are what is left to turn; NaN where unknown.
 
     `fault` says what is wrong with the joints' feedback or the images, `images_missing` whether no results of images
-    arrive. Where target and fixation point are is computed when it is read: most cycles' reports have no reader.
+    arrive. `attention` is its policy, what it attends to and why. Where target and fixation point are is computed when
+    it is read: most cycles' reports have no reader.
     """
 
     stamp_s: float
@@ -45,6 +46,7 @@ class GazeReport:
     locate_fixation: Callable[[], tuple[Array, float]]
     fault: str = ""
     images_missing: bool = False
+    attention: str = ""
 
     @cached_property
     def target(self) -> TargetPosition:
@@ -70,14 +72,15 @@ class GazeReport:
 class Command:
     """One cycle's result.
 
-    Joint angles (3,) to send, or None; the report; the goals that ended; and what the tracker is to follow from now on,
-    None for no change.
+    Joint angles (3,) to send, or None; the report; the goals that ended; what the tracker is to follow from now on, and
+    which object the detector is to measure, None for no change.
     """
 
     joints_rad: Array | None
     report: GazeReport
     outcomes: tuple[Outcome, ...]
     track_request: TrackRequest | None = None
+    object_request: ObjectRequest | None = None
 
 
 _CLAIM_S = 0.6  # without results of images, after which eyes are no longer said to be verged
@@ -91,6 +94,7 @@ def make_report(
     mode: str,
     rig: Rig,
     fault: str = "",
+    attention: str = "",
     uses_images: bool = True,
 ) -> GazeReport:
     """Return the state at `now_s` under this law and mode; `fault` is that of the feedback or the images.
@@ -127,6 +131,7 @@ def make_report(
         locate_fixation=partial(fixation_of, joints, perception.kinematics),
         fault=fault,
         images_missing=images_missing,
+        attention=attention,
     )
 
 

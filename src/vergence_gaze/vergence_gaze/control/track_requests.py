@@ -1,4 +1,6 @@
-"""What the tracker is asked for: a click, a point in space, what boxes show, or what the left eye looks at."""
+"""What is asked for: of the tracker a click, a point in space, what boxes show, or what the left eye looks at; of the
+detector a class or an object.
+"""
 
 import math
 
@@ -6,18 +8,30 @@ import numpy as np
 
 from vergence_gaze.control.perception import Perception
 from vergence_gaze.estimation.directions import spread_of_eye
-from vergence_gaze.goals.goal import TrackRequest
+from vergence_gaze.goals.goal import ObjectRequest, TrackRequest
 from vergence_gaze.parameters import GazeParameters
 
 _STRAIGHT_AHEAD = (0.0, 0.0)
 
 
 class TrackRequests:
-    """Keeps the request that the next command carries."""
+    """Keeps the requests that the next command carries."""
 
     def __init__(self, perception: Perception, parameters: GazeParameters) -> None:
         self._perception, self._p = perception, parameters
         self._next: TrackRequest | None = None
+        self._object, self._object_sent = ObjectRequest(), False
+
+    def ask_object(self, request: ObjectRequest) -> None:
+        """Ask the detector for this; it keeps to it until the next request."""
+        self._object_sent = self._object_sent and request == self._object
+        self._object = request
+
+    def pop_object(self) -> ObjectRequest | None:
+        """Return what the detector is to be asked for, None for no change."""
+        request = None if self._object_sent else self._object
+        self._object_sent = True
+        return request
 
     def ask(self, request: TrackRequest) -> None:
         """Ask for this."""

@@ -128,10 +128,14 @@ class StillGate:
 
 @dataclass
 class RequestGate:
-    """Refuses what is not of the present request: a goal id of the tracker, a class ("": any), or a stream."""
+    """Refuses what is not of the present request: a goal id of the tracker, a class ("": any), or a stream.
+
+    Of a class, `object_id` is the one object that is meant; 0 for the one that the detector has chosen.
+    """
 
     goal_id: int = 0
     class_name: str | None = None
+    object_id: int = 0
     stream: bool = False
 
     def check(self, sighting: Sighting, estimate: TargetEstimate | None) -> Verdict:
@@ -140,7 +144,8 @@ class RequestGate:
         if isinstance(seen, PointSighting):
             return Verdict(self.stream)
         if isinstance(seen, BoxSighting):
-            return Verdict(self.class_name is not None and self.class_name in ("", seen.class_name))
+            of_class = self.class_name is not None and self.class_name in ("", seen.class_name)
+            return Verdict(of_class and self.object_id in (0, seen.object_id))
         if not self.goal_id:
             return Verdict(False)
         answers = seen.goal_id == self.goal_id

@@ -57,12 +57,21 @@ class TrackSighting:
 
 
 @dataclass(frozen=True)
+class DetectedObject:
+    """An object that the detector sees: its id, which it keeps while it is seen, and its class."""
+
+    object_id: int
+    class_name: str
+
+
+@dataclass(frozen=True)
 class BoxSighting:
     """The detected target: its direction in each eye [rad] (right positive, down positive), NaN where unseen.
 
     `surface_disparity_rad` is the refined disparity of the surface inside the boxes, `surface_sigma_rad` its standard
     deviation, NaN if not refined; `extent_rad` and `extent_height_rad` are the angular width and height of the left
-    box; `whole` is False for boxes cut by the border or partly hidden, whose centres are not the object's.
+    box; `whole` is False for boxes cut by the border or partly hidden, whose centres are not the object's. `object_id`
+    is the target's, 0 if it has none; `objects` are all that are in view.
     """
 
     stamp_s: float
@@ -80,6 +89,8 @@ class BoxSighting:
     whole: bool = True
     extent_height_rad: float = math.nan
     surface_sigma_rad: float = math.nan
+    object_id: int = 0
+    objects: tuple[DetectedObject, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,7 @@ Array = npt.NDArray[np.float64]
 
 _NAMED_DISTANCES = 4
 _FARTHEST_M = 10.0
+_LEARNT_RAD = 0.001  # change of half a joint's play from which the target's estimate starts anew
 _RESTED_S = 0.05  # an image shows where a move ended once the joints have rested this long
 
 
@@ -60,11 +61,17 @@ class TargetTracking(TargetEstimator):
         self._start(RequestGate())
 
     def _start(
-        self, asked: RequestGate, point: RequestedPoint | None = None, by_class: RequestedClass | None = None
+        self,
+        asked: RequestGate,
+        point: RequestedPoint | None = None,
+        by_class: RequestedClass | None = None,
+        motion: bool = False,
     ) -> None:
         """Remove the target, and pass sightings through the gates of what is asked for from now on."""
         self.remove_target()
-        self.point, self._class, self._asked = point, by_class, asked
+        self.point, self._class, self._asked, self._motion = point, by_class, asked, motion
+        self.object_id = 0
+        """The detected object that is the target; 0 while none is."""
         self.ambiguity = ""
         """Which distances the target may have, while several fit."""
         self._request: TrackRequest | None = None
@@ -84,6 +91,11 @@ class TargetTracking(TargetEstimator):
     def class_name(self) -> str | None:
         """The requested class ("": any), None while no class is requested."""
         return self._asked.class_name
+
+    @property
+    def awaits_motion(self) -> bool:
+        """True while nothing has moved since it was asked for."""
+        return self._motion and not self.filter.initialised
 
     @property
     def follows_stream(self) -> bool:
@@ -109,9 +121,21 @@ class TargetTracking(TargetEstimator):
         self.filter.initialise(stamp_s, angles_rad, covariance)
         self.seen_s = now_s
 
-    def request_class(self, class_name: str, goal_id: int) -> None:
-        """Start with any target of a detected class ("": of any class), wherever it is."""
-        self._start(RequestGate(goal_id, class_name), by_class=RequestedClass(goal_id, self._p.target.lost_after_s))
+    def request_class(self, class_name: str, goal_id: int, object_id: int = 0) -> None:
+        """Start with a target of a detected class ("": of any class), wherever it is; with an id this object alone."""
+        by_class = RequestedClass(goal_id, self._p.target.lost_after_s)
+        self._start(RequestGate(goal_id, class_name, object_id), by_class=by_class)
+
+    def is_another(self, box: BoxSighting) -> bool:
+        """Return whether the detector has chosen another object of the requested class as the target than before."""
+        known = self.object_id and box.object_id and box.object_id != self.object_id
+        return bool(
+            known and box.usable and self._asked.class_name in ("", box.class_name) and not self._asked.object_id
+        )
+
+    def request_motion(self, goal_id: int) -> None:
+        """Start with whatever moves next, as the tracker answers for this goal."""
+        self._start(RequestGate(goal_id), motion=True)
 
     def request_stream(self) -> None:
         """Start with the next point of the stream."""
@@ -150,6 +174,8 @@ class TargetTracking(TargetEstimator):
             return self._directions.box(box, sigma, rate_rad_s, self._assumed_vergence_rad(box.stamp_s))
 
         accepted = self._consider(Sighting("box", box, locate, box.skew_s, box.extent_rad), now_s)
+        if accepted:
+            self.object_id = box.object_id
         if accepted and self._class is not None:
             request = self._class.request(box, now_s)
             if request is not None:
@@ -188,7 +214,11 @@ class TargetTracking(TargetEstimator):
         if direction_only:
             measurement, seen_rad = without_depth(measurement, seen_rad)
         if sighting.source == "track" and self._class is None:
-            self._observe_play(sighting.stamp_s, sighting.skew_s, seen_rad)
+            learnt = self._observe_play(sighting.stamp_s, sighting.skew_s, seen_rad)
+            if learnt and np.isfinite(seen_rad).all():
+                # Until now the target seemed to move by what the joints did not.
+                measurement, seen_rad = sighting.locate()
+                self.initialise_from(measurement)
         if not self.filter.initialised:
             self.initialise_from(measurement)
         accepted = self.update(measurement, seen_rad, sighting.skew_s, now_s, sighting.source)
@@ -215,14 +245,18 @@ class TargetTracking(TargetEstimator):
             distances_m.append(f"{distance_m:.2f} m" if distance_m < _FARTHEST_M else "far away")
         return f"{track.reason}: {', '.join(distances_m)}" if len(distances_m) > 1 else track.reason
 
-    def _observe_play(self, stamp_s: float, skew_s: float, seen_rad: Array) -> None:
-        """Learn the joints' play from a target at rest that eyes at rest have just seen at these angles (3,)."""
+    def _observe_play(self, stamp_s: float, skew_s: float, seen_rad: Array) -> bool:
+        """Learn the joints' play from a target that eyes at rest have just seen at these angles (3,).
+
+        Returns whether it is now another than the target's estimate was made with.
+        """
         first, last = sorted((stamp_s, stamp_s + skew_s))
-        if self.filter.moving or self._history.speed_within(first - _RESTED_S, last) > 0.0:
-            return
+        if self._history.speed_within(first - _RESTED_S, last) > 0.0:
+            return False
         at_left, at_right = self._history.shaft_at(stamp_s), self._history.shaft_at(last)
-        axes_rad = np.array([at_left[0], at_right[1], at_left[2]])
+        axes_rad, before_rad = np.array([at_left[0], at_right[1], at_left[2]]), self._history.half_play_rad.copy()
         self._history.play.observe(stamp_s, self._history.reported_at(stamp_s), seen_rad - axes_rad)
+        return bool(np.abs(self._history.half_play_rad - before_rad).max() > _LEARNT_RAD)
 
 
 __all__ = ["SightingError", "TargetTracking"]

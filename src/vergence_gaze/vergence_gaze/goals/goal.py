@@ -14,6 +14,7 @@ class GoalKind(enum.IntEnum):
     ANGLES = 3
     RELATIVE_ANGLES = 4
     CLASS = 5
+    MOTION = 6
 
 
 class Result(enum.IntEnum):
@@ -38,7 +39,8 @@ class Goal:
     """One request. Pixels come as normalised, undistorted coordinates (x right, y down), points in rig_base.
 
     `stamp_s` is the stamp of the image that pixels were read from; NaN for the newest. `depth_m` is along the eye's
-    ray, NaN if unknown. `left_eye` says which eye a single pixel is of.
+    ray, NaN if unknown. `left_eye` says which eye a single pixel is of; `extent_rad` are the angular width and height
+    of the object there, NaN if unknown.
     """
 
     kind: GoalKind
@@ -47,6 +49,7 @@ class Goal:
     left_xy: tuple[float, float] = (math.nan, math.nan)
     right_xy: tuple[float, float] = (math.nan, math.nan)
     depth_m: float = math.nan
+    extent_rad: tuple[float, float] = (math.nan, math.nan)
     version_rad: float = math.nan
     vergence_rad: float = math.nan
     tilt_rad: float = math.nan
@@ -59,8 +62,8 @@ class Goal:
 class TrackRequest:
     """What the tracker is to follow for a goal: a point (x, y) of one eye's image, in normalised coordinates.
 
-    `extent_rad` are the angular width and height of the object there, NaN if unknown. `goal_id` 0 asks for no point:
-    the tracker is free to follow what lies at the fovea.
+    `extent_rad` are the angular width and height of the object there, NaN if unknown. `motion` asks for whatever moves
+    next instead. `goal_id` 0 asks for no point: the tracker is free to follow what lies at the fovea.
     """
 
     goal_id: int
@@ -68,6 +71,15 @@ class TrackRequest:
     left_eye: bool = True
     xy: tuple[float, float] = (math.nan, math.nan)
     extent_rad: tuple[float, float] = (math.nan, math.nan)
+    motion: bool = False
+
+
+@dataclass(frozen=True)
+class ObjectRequest:
+    """Which object the detector is to measure: one of a class ("": any), or this one of it while it is seen."""
+
+    class_name: str = ""
+    object_id: int = 0
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,11 @@ class ClassRequest:
     class_name: str
 
 
+@dataclass(frozen=True)
+class MotionRequest:
+    """Whatever moves next."""
+
+
 def resolve_goal(
     goal: Goal,
     rig: Rig,
@@ -54,7 +59,7 @@ def resolve_goal(
     history: ShaftHistory,
     now_s: float,
     fault: str = "",
-) -> RequestedTarget | RequestedPose | ClassRequest:
+) -> RequestedTarget | RequestedPose | ClassRequest | MotionRequest:
     """Return what a goal requests; raises GoalError (INVALID or UNREACHABLE).
 
     `fault` says why no joint is known, if none is.
@@ -66,6 +71,8 @@ def resolve_goal(
         if not goal.class_name:
             raise GoalError(Result.INVALID, "class_name must be one of the detector's classes: got an empty text")
         return ClassRequest(goal.class_name)
+    if goal.kind is GoalKind.MOTION:
+        return MotionRequest()
     if not history.known:
         raise GoalError(Result.INVALID, f"joint_states must have arrived before a goal: {fault or 'none has'}")
     if goal.kind in (GoalKind.ANGLES, GoalKind.RELATIVE_ANGLES):

@@ -2,9 +2,11 @@
 
 import difflib
 import math
+from dataclasses import replace
 
 from vergence_gaze.estimation.observations import BoxSighting
-from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Result, TrackRequest
+from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, Outcome, Result, TrackRequest
+from vergence_rig.face_model import FACE_CLASS, FACE_HINT
 from vergence_rig.parameters import shown as shown_value
 
 _SHOWN = 20
@@ -18,7 +20,20 @@ def check_class(goal: Goal, classes: tuple[str, ...] | None) -> None:
     others = [name for name in classes if name not in close][: _SHOWN - len(close)]
     shown = ", ".join([*close, *others]) + (", ..." if len(classes) > _SHOWN else "")
     got = shown_value(goal.class_name)
-    raise GoalError(Result.INVALID, f"class_name must be one that the detector looks for ({shown}): got {got}")
+    text = f"class_name must be one that the detector looks for ({shown}): got {got}"
+    raise GoalError(Result.INVALID, text + _face_hint(goal.class_name))
+
+
+def with_detector(outcome: Outcome, class_name: str, classes: tuple[str, ...] | None) -> Outcome:
+    """Return how a goal for a class ended, with what is missing where no detector has said which classes it finds."""
+    if outcome.result is Result.VERGED or classes is not None:
+        return outcome
+    missing = "no classes of a detector have arrived (vergence/detector_classes): box_metric_node must run"
+    return replace(outcome, reason=f"{outcome.reason}; {missing}{_face_hint(class_name)}")
+
+
+def _face_hint(class_name: str) -> str:
+    return f"; {FACE_HINT}" if class_name == FACE_CLASS else ""
 
 
 class RequestedClass:

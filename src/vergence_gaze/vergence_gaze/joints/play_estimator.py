@@ -33,9 +33,13 @@ class PlayEstimator:
     def restart(self) -> None:
         """Drop the last observation: the next one is of another target."""
         self._before: tuple[float, Array, Array] | None = None
+        self._target_rests = True
 
     def observe(self, stamp_s: float, reported_rad: Array, error_rad: Array) -> None:
-        """Update by the same resting target, seen with resting eyes once more.
+        """Update by the same target, seen with resting eyes once more.
+
+        Whether the target rests is seen while the eyes do: the estimate of its motion is no evidence, because play that
+        is not as described looks like motion.
 
         Args:
             stamp_s: of the exposure; what was seen too long before may be of a target that has moved since.
@@ -45,7 +49,10 @@ class PlayEstimator:
         if self._before is not None and stamp_s - self._before[0] < _LONGEST_GAP_S:
             moves = reported_rad - self._before[1]
             seen = self._before[2] - error_rad
-            for i in np.flatnonzero(np.isfinite(seen) & (np.abs(moves) > _SMALLEST_MOVE_RAD)):
+            known, moved = np.isfinite(seen), np.abs(moves) > _SMALLEST_MOVE_RAD
+            if known.any() and not moved.any():
+                self._target_rests = bool(np.abs(seen[known]).max() < _UNMOVED_RAD)
+            for i in np.flatnonzero(known & moved if self._target_rests else []):
                 self._observe_move(int(i), float(moves[i]), float(seen[i]))
         self._before = stamp_s, reported_rad.copy(), error_rad.copy()
 

@@ -9,6 +9,7 @@ from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import CameraInfo, JointState
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
@@ -19,6 +20,7 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_seconds
+from vergence_gaze.attention_parameters import POLICIES
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.control.report import Command, GazeReport
 from vergence_gaze.estimation.observations import Observation, PointSighting
@@ -29,7 +31,7 @@ from vergence_gaze.ros import gaze_messages as convert
 from vergence_gaze.ros.look_at_server import LookAtServer
 from vergence_gaze.ros.point_frames import PointFrames
 from vergence_gaze.ros.vision_input import VisionInput
-from vergence_msgs.msg import DetectorClasses, GazeState, TrackRequest
+from vergence_msgs.msg import DetectorClasses, GazeState, ObjectRequest, TrackRequest
 from vergence_rig.camera import CameraModel, CameraModelError
 from vergence_rig.eye_image import described_camera, eye_images
 from vergence_rig.kinematics import Kinematics
@@ -64,20 +66,22 @@ class GazeControllerNode(Node):
         watch = watch_qos(self, diagnostics)
         self._command, self._to_command = watch.create_publisher(JointState, "joint_command"), convert.JointCommand()
         self._track_requests = watch.create_publisher(TrackRequest, "vergence/track_request")
+        # Latched: what holds until the next message, for nodes that start later.
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._object_requests = watch.create_publisher(ObjectRequest, "vergence/object_request", latched)
         read = self._update_readers
         self._read = (False, False, False)
         self._state = watch.create_publisher(GazeState, "gaze/state", matched=read)
         self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point", matched=read)
         self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1), matched=read)
         self._joint_input = JointStateInput(self, diagnostics, watch, lambda j: self._add(convert.joint_report(j)))
-        # Latched: one message per start of the servos' driver.
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         watch.create_subscription(
             JointState, "servo_node/resolution", lambda m: self._add(convert.joint_resolution(m)), latched
         )
         self._vision = VisionInput(self, watch, self._add, lambda: self._images[0])
         watch.create_subscription(DetectorClasses, "vergence/detector_classes", self._on_classes, latched)
         watch.create_subscription(PointStamped, "gaze/target", self._on_target)
+        watch.create_subscription(String, "gaze/attention", self._on_attention)
         subscribe_camera_info(watch, "left/camera_info", lambda m: self._on_camera(m, left=True))
         subscribe_camera_info(watch, "right/camera_info", lambda m: self._on_camera(m, left=False))
         self.create_service(SetBool, "~/enable", self._on_enable)
@@ -108,6 +112,16 @@ class GazeControllerNode(Node):
             self.get_logger().warning(f"a point on gaze/target was ignored: {error}", throttle_duration_sec=5.0)
             return
         self._add(PointSighting(stamp_s, place, math.nan))
+
+    def _on_attention(self, message: String) -> None:
+        if message.data in POLICIES:
+            self._end_rest()
+            self._controller.set_attention(message.data, self._now_s())
+        else:
+            allowed = ", ".join(POLICIES)
+            self.get_logger().warning(
+                f"a policy on gaze/attention was ignored: it must be one of {allowed}: got {message.data!r}"
+            )
 
     def _on_camera(self, message: CameraInfo, left: bool) -> None:
         model: CameraModel | None
@@ -160,6 +174,8 @@ class GazeControllerNode(Node):
             self._command.publish(self._to_command(command.joints_rad, now_s))
         if command.track_request is not None:
             self._track_requests.publish(convert.track_request(command.track_request, self._images))
+        if command.object_request is not None:
+            self._object_requests.publish(convert.object_request(command.object_request, now_s))
         if state_read:
             self._state.publish(convert.gaze_state(report, now_s))
         if fixation_read and math.isfinite(report.fixation_m[0]):

@@ -15,15 +15,17 @@ from vergence_common.stamps import to_seconds, to_stamp
 from vergence_gaze.control.report import GazeReport
 from vergence_gaze.estimation.observations import (
     BoxSighting,
+    DetectedObject,
     EdgeContrast,
     EyeRotationObservation,
     JointReport,
     JointResolution,
     TrackSighting,
 )
-from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, TrackRequest
+from vergence_gaze.goals.goal import Goal, GoalKind, ObjectRequest, Outcome, TrackRequest
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack
+from vergence_msgs.msg import ObjectRequest as ObjectRequestMessage
 from vergence_msgs.msg import TrackRequest as TrackRequestMessage
 from vergence_rig.camera import CameraModel
 from vergence_rig.eye_image import EyeImage
@@ -74,8 +76,8 @@ def track_sighting(message: TargetTrack, left_image: EyeImage) -> TrackSighting:
 
 def track_request(request: TrackRequest, images: tuple[EyeImage, EyeImage]) -> TrackRequestMessage:
     """Return the request in raw pixels of the eye's image."""
-    message = TrackRequestMessage(goal_id=request.goal_id)
-    if request.goal_id:
+    message = TrackRequestMessage(goal_id=request.goal_id, motion=request.motion)
+    if request.goal_id and not request.motion:
         image = images[0 if request.left_eye else 1]
         message.header.stamp = to_stamp(request.stamp_s)
         message.eye = TrackRequestMessage.EYE_LEFT if request.left_eye else TrackRequestMessage.EYE_RIGHT
@@ -84,6 +86,12 @@ def track_request(request: TrackRequest, images: tuple[EyeImage, EyeImage]) -> T
         if np.isfinite(request.extent_rad).all():
             message.width_px, message.height_px = (image.fx_px * extent for extent in request.extent_rad)
     return message
+
+
+def object_request(request: ObjectRequest, now_s: float) -> ObjectRequestMessage:
+    """Return what the detector is asked for."""
+    header = Header(stamp=to_stamp(now_s))
+    return ObjectRequestMessage(header=header, class_name=request.class_name, object_id=request.object_id)
 
 
 def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
@@ -112,6 +120,8 @@ def box_sighting(message: BoxVergence, focal_px: float) -> BoxSighting:
         whole=message.status not in (BoxVergence.STATUS_CUT, BoxVergence.STATUS_OCCLUDED),
         surface_sigma_rad=message.refined_sigma_px / focal_px,
         extent_height_rad=(message.left.y_max_px - message.left.y_min_px) / focal_px,
+        object_id=message.object_id,
+        objects=tuple(DetectedObject(one.object_id, one.class_name) for one in message.objects),
     )
 
 
@@ -153,7 +163,7 @@ def camera_model(message: CameraInfo) -> CameraModel:
 
 
 def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: EyeImage, right: EyeImage) -> Goal:
-    """Return a LookAt goal; `point_m` is its point, already in rig_base. Raises ValueError for an unknown kind."""
+    """Return a LookAt goal; `point_m` is its point, already in rig_base. Raises ValueError for another kind or size."""
     stamp_s = to_seconds(request.header.stamp)
     left_xy = left.undistort([[request.left_x_px, request.left_y_px]])[0]
     right_xy = right.undistort([[request.right_x_px, request.right_y_px]])[0]
@@ -164,6 +174,7 @@ def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: EyeIma
         left_xy=(float(left_xy[0]), float(left_xy[1])),
         right_xy=(float(right_xy[0]), float(right_xy[1])),
         depth_m=request.depth_m if request.depth_m > 0 else math.nan,
+        extent_rad=_extent_rad(request, left if request.eye == LookAt.Goal.EYE_LEFT else right),
         version_rad=request.version_rad,
         vergence_rad=request.vergence_rad,
         tilt_rad=request.tilt_rad,
@@ -171,6 +182,16 @@ def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: EyeIma
         stamp_s=stamp_s if stamp_s > 0 else math.nan,
         time_limit_s=request.time_limit_s,
     )
+
+
+def _extent_rad(request: LookAt.Goal, image: EyeImage) -> tuple[float, float]:
+    """Return the angular size of a goal's object, NaN if unknown. Raises ValueError for one that no object has."""
+    size_px = request.width_px, request.height_px
+    if any(side < 0.0 or math.isinf(side) for side in size_px):
+        raise ValueError(f"width_px and height_px must be at least 0 and finite: got {size_px[0]:g} and {size_px[1]:g}")
+    if not all(side > 0.0 for side in size_px):
+        return math.nan, math.nan
+    return size_px[0] / image.fx_px, size_px[1] / image.fx_px
 
 
 def look_at_result(outcome: Outcome, report: GazeReport | None, stamp_s: float) -> LookAt.Result:
@@ -217,6 +238,7 @@ def gaze_state(report: GazeReport, now_s: float) -> GazeState:
         phase=int(report.phase),
         phase_name=report.phase.name.lower(),
         reason=report.reason,
+        attention=report.attention,
         law=report.law,
         mode=report.mode,
         verged=report.verged,

@@ -11,7 +11,7 @@ from vergence_common.stamps import to_seconds
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.control.report import Command, GazeReport
 from vergence_gaze.goals.goal import Outcome, Result
-from vergence_gaze.goals.requested_class import check_class
+from vergence_gaze.goals.requested_class import check_class, with_detector
 from vergence_gaze.ros import gaze_messages as convert
 from vergence_gaze.ros.point_frames import PointFrames
 from vergence_msgs.action import LookAt
@@ -91,7 +91,9 @@ class LookAtServer:
 
     def _execute(self, handle: ServerGoalHandle) -> LookAt.Result:
         """Return the result of a goal that has ended."""
-        outcome = self._outcomes.pop(bytes(handle.goal_id.uuid))
+        outcome, request = self._outcomes.pop(bytes(handle.goal_id.uuid)), handle.request
+        if request.kind == LookAt.Goal.CLASS:
+            outcome = with_detector(outcome, request.class_name, self.classes)
         if outcome.result is Result.INVALID:
             handle.abort()
             return convert.look_at_result(outcome, None, self._now_s())

@@ -16,11 +16,13 @@ import numpy.typing as npt
 from vergence_gaze.control.report import Command
 from vergence_gaze.estimation.observations import (
     BoxSighting,
+    DetectedObject,
     EdgeContrast,
     JointReport,
     Observation,
     TrackSighting,
 )
+from vergence_gaze.goals.goal import ObjectRequest
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_rig.servo import ServoPlant, ServoSpec
@@ -29,6 +31,10 @@ Array = npt.NDArray[np.float64]
 
 TICK_S = 1.0 / 300.0
 """Everything happens on this raster: 30 Hz images every 10 ticks, 50 Hz joint reports every 6."""
+
+
+TARGET_ID = 1
+"""The target's id among the detected objects."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,10 @@ class FakeHead:
     `mistaken` gives, by estimator ("fovea" for the contrast, "track", "box"), the point that it measures instead of the
     target at `t`, or None while it is right. `servos` are the real servos by joint, where they differ from the rig's
     description. Time starts at `begin_s`.
+
+    `others` are further objects that the detector sees, by id (not TARGET_ID), each with its class and its path. The
+    detector measures the requested one; without a request the target, and where that is not in view any other. The
+    tracker follows the object that was measured last when it was asked.
     """
 
     rig: Rig
@@ -75,6 +85,8 @@ class FakeHead:
     begin_s: float = 0.0
     report_ticks: int = 6
     built: Rig | None = None
+    class_name: str = "target"
+    others: Mapping[int, tuple[str, Callable[[float], Array]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._built = self.built or self.rig
@@ -93,6 +105,10 @@ class FakeHead:
             self._models[name] = ServoPlant(joint.servo, start, self.begin_s)
         self.reported_rad = {name: self.start_rad.get(name, 0.0) for name in JOINT_NAMES}
         self._goal_id, self._track_id, self._lock_s = 0, 0, self.begin_s
+        self.wanted = ObjectRequest()
+        """What the detector was asked for."""
+        self.chosen_id = self._tracked_id = TARGET_ID
+        """The object that the detector has measured last."""
         self._pending_frame: tuple[float, Array, bool] | None = None
         self._left_pixel = np.full(2, math.nan)
 
@@ -114,6 +130,8 @@ class FakeHead:
 
     def execute(self, command: Command) -> None:
         """Do what a controller's cycle asks for: turn the joints, and track for a goal."""
+        if command.object_request is not None:
+            self.wanted = command.object_request
         if command.track_request is not None:
             self.track_for(command.track_request.goal_id)
         if command.joints_rad is not None:
@@ -123,10 +141,11 @@ class FakeHead:
         """Track the target on behalf of a goal from now on; 0 ends that."""
         self._goal_id, self._lock_s = goal_id, self.time_s
         self._track_id += 1
+        self._tracked_id = self.chosen_id
 
-    def true_errors_rad(self) -> Array:
-        """Return (version, vergence, tilt) to the target minus the true ones (3,)."""
-        wanted, true = self._kinematics.gaze_for_point(self.target(self.time_s)), self.true_rad
+    def true_errors_rad(self, object_id: int = TARGET_ID) -> Array:
+        """Return (version, vergence, tilt) to the target, or to another object, minus the true ones (3,)."""
+        wanted, true = self._kinematics.gaze_for_point(self._path(object_id)(self.time_s)), self.true_rad
         return np.array(
             [
                 wanted.version_rad - 0.5 * (true[0] + true[1]),
@@ -163,8 +182,11 @@ class FakeHead:
         x, y, z = (ray @ self._kinematics.rotation_rig_from_optical(pan, tilt)).tolist()
         return np.array([x / z, y / z]) if z > 1e-6 else np.full(2, math.nan)
 
+    def _path(self, object_id: int) -> Callable[[float], Array]:
+        return self.target if object_id == TARGET_ID else self.others[object_id][1]
+
     def _project(self, left: bool) -> Array:
-        return self.project(self.target(self.time_s), left)
+        return self.project(self._path(self._tracked_id)(self.time_s), left)
 
     def _see_pair(self, left_s: float, left_xy: Array, visible: bool, right_s: float) -> None:
         vision, focal = self.vision, self.rig.left_camera.fx_px
@@ -202,7 +224,31 @@ class FakeHead:
         contrast = 0.3 + 0.68 * (1.0 - math.exp(-((pixels / 3.6) ** 1.2))) + self._random.normal(0.0, 0.03)
         self._send(arrival_s, EdgeContrast(left_s, contrast, min(pixels, 8.0) + 1.0))
         if vision.boxes and self._ticks % vision.box_frame_ticks < vision.frame_ticks:
+            if self.others:
+                self._choose(left_s)
+            if self._tracked_id != self.chosen_id:
+                left_xy, right_xy = (self.project(self._path(self.chosen_id)(left_s), left) for left in (True, False))
+                in_left, in_right = self._in_view(left_xy), self._in_view(right_xy)
             self._see_boxes(left_s, skew_s, left_xy if in_left else None, right_xy if in_right else None)
+
+    def _in_sight(self, time_s: float) -> dict[int, str]:
+        """Return the classes of the objects in view of the left eye, by id."""
+        named = {TARGET_ID: self.class_name} | {number: name for number, (name, _) in self.others.items()}
+        return {
+            number: name
+            for number, name in named.items()
+            if (number != TARGET_ID or self.visible(time_s))
+            and self._in_view(self.project(self._path(number)(time_s), left=True))
+        }
+
+    def _choose(self, time_s: float) -> None:
+        """Choose which object is measured, as box_metric_node does."""
+        seen, wanted = self._in_sight(time_s), self.wanted
+        fitting = [number for number, name in seen.items() if wanted.class_name in ("", name)]
+        if wanted.object_id in seen:
+            self.chosen_id = wanted.object_id
+        elif fitting and self.chosen_id not in fitting:
+            self.chosen_id = fitting[0]
 
     def _mistake_rad(self, estimator: str, time_s: float, disparity_rad: float) -> float:
         """Return how far an estimator's disparity is off because it measures another object; 0 if it does not."""
@@ -228,6 +274,8 @@ class FakeHead:
                 blurred = xy + self._random.normal(0.0, vision.box_noise_px / focal, 2)
                 angles[2 * i : 2 * i + 2] = np.arctan(blurred)
         usable = left_xy is not None or right_xy is not None
+        seen = self._in_sight(left_s)
+        name = self.class_name if self.chosen_id == TARGET_ID else self.others[self.chosen_id][0]
         self._send(
             left_s + skew_s - vision.stamp_error_s + vision.box_latency_s,
             BoxSighting(
@@ -241,9 +289,11 @@ class FakeHead:
                 surface_sigma_rad=surface_sigma_rad,
                 sigma_rad=vision.box_noise_px / focal,
                 extent_rad=vision.extent_rad,
-                class_name="target" if usable else "",
+                class_name=name if usable else "",
                 usable=usable,
                 extent_height_rad=vision.extent_rad,
+                object_id=self.chosen_id if usable else 0,
+                objects=tuple(DetectedObject(number, seen_name) for number, seen_name in seen.items()),
             ),
         )
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.boxes.assignment import optimal_assignment
 from vergence_metric.boxes.detections import Box
+from vergence_metric.boxes.face_pairing import face_cost
 from vergence_metric.boxes.pair_geometry import PairGeometry, Pixel
 from vergence_metric.boxes.parameters import AssociationParameters
 from vergence_metric.boxes.patch_descriptor import descriptor_correlation, patch_descriptor
@@ -125,7 +126,9 @@ def _cost(a: Box, b: Box, p: AssociationParameters, vertical_px: float, geometry
     vertical = _vertical_difference(a, b, vertical_px)
     if abs(vertical) > p.max_vertical_px:
         return math.inf
-    cost = (3.0 * vertical / p.max_vertical_px) ** 2
+    cost = (3.0 * vertical / p.max_vertical_px) ** 2 + ((a.score - b.score) / _SCORE_SIGMA) ** 2
+    if a.landmarks_px and b.landmarks_px:
+        return cost + face_cost(a, b, geometry)
     for side in (0, 1):
         # A border shortens a box along its own direction only.
         if a.cut[side] or a.cut[side + 2] or b.cut[side] or b.cut[side + 2]:
@@ -137,7 +140,7 @@ def _cost(a: Box, b: Box, p: AssociationParameters, vertical_px: float, geometry
             return math.inf
         sigma = math.hypot(_SIZE_SIGMA * (2.0 - side), _SIZE_FLOOR_PX / min(sizes))
         cost += min((stretch / sigma) ** 2, 9.0)
-    return cost + ((a.score - b.score) / _SCORE_SIGMA) ** 2
+    return cost
 
 
 def _motion_cost(a: Box, b: Box, expected: Expected | None) -> float:
@@ -151,7 +154,9 @@ def _motion_cost(a: Box, b: Box, expected: Expected | None) -> float:
 
 
 def _vertical_difference(a: Box, b: Box, vertical_px: float) -> float:
-    """Return the difference of the rows less `vertical_px` [px], by the sides that no border cuts."""
+    """Return the difference of the rows less `vertical_px` [px], by landmarks or the sides that no border cuts."""
+    if a.landmarks_px and b.landmarks_px:
+        return float(np.mean(np.subtract(a.landmarks_px, b.landmarks_px)[:, 1])) - vertical_px
     sides = [s for s in (1, 3) if not a.cut[s] and not b.cut[s]]
     if not sides:
         return 0.0

@@ -58,6 +58,8 @@ def _frame(
 ) -> None:
     x_min, y_min, x_max, y_max = (round(value) for value in box.xyxy_px)
     cv2.rectangle(picture, (x_min + shift, y_min), (x_max + shift, y_max), ink, width)
+    for x, y in box.landmarks_px:
+        cv2.circle(picture, (round(x) + shift, round(y)), 1, ink, -1)
     if named:
         place = (x_min + shift, max(y_min - 4, 10))
         cv2.putText(picture, f"{box.class_name} {box.score:.2f}", place, _FONT, 0.4, ink, 1, cv2.LINE_AA)

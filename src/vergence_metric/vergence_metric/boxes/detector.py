@@ -1,5 +1,6 @@
-"""A YOLO detector in an ONNX file; `detect` returns boxes in raw pixels of the image, whatever the model's layout."""
+"""A detector in an ONNX file; `detect` returns boxes in raw pixels of the image, whatever the model's layout."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,18 +8,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.boxes.class_names import class_names, read_labels
 from vergence_metric.boxes.detections import Detections, make_detections
-from vergence_metric.boxes.errors import DetectorError, DetectorImageError, ModelClassError
-from vergence_metric.boxes.layouts import Candidates, WarmUp, find_layout
+from vergence_metric.boxes.errors import DetectorError, DetectorImageError, ModelClassError, ModelLayoutError
+from vergence_metric.boxes.layouts import Candidates, Layout, WarmUp, find_layout
 from vergence_metric.boxes.letterbox import BORDER_GREY, Letterbox
 from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.boxes.preprocessing import Preprocessing
 from vergence_metric.boxes.second_look import CROP_PX, look_again
 from vergence_metric.boxes.session import ModelSession
 from vergence_metric.boxes.suppression import suppress
+from vergence_metric.boxes.warm_up_picture import warm_up_picture
 
 _DEFAULT_SIZE_PX = (640, 640)
-_DEFAULT_THRESHOLD = 0.35
 _MAX_DIGITS = 9
 _FIRST_LOOK_SHARE = 0.5  # of the threshold: score that earns a box a second look
 _LEAST_CROP_SCORE = 0.05
@@ -40,12 +42,12 @@ class Detector:
         """
         self._session = ModelSession(parameters.model, parameters.device, threads)
         self.input_px = _input_size(self._session, parameters)
-        names = self._session.class_names()
-        self.layout = find_layout(self._warm_up(len(names) or None), parameters.layout)
+        given, metadata = read_labels(parameters.labels), self._session.class_names()
+        self.layout = self._recognised(parameters.layout, len(metadata), len(given))
         self.preprocessing = self.layout.preprocessing(self._session.input.dtype).overridden(
             parameters.color, parameters.scale, parameters.resize
         )
-        self.class_names = names or tuple(str(i) for i in range(self.layout.classes or 0))
+        self.class_names = class_names(parameters.labels, given, metadata, self.layout.class_names, self.layout.classes)
         self._letterboxes: dict[tuple[int, int], Letterbox] = {}
         fixed = self._session.input.width_px or self._session.input.height_px
         whole_strides = not any(side % self._session.stride_px() for side in CROP_PX)
@@ -61,8 +63,8 @@ class Detector:
 
     @property
     def threshold(self) -> float:
-        """The score that objects need: the parameter's, else the one in the model's metadata, else 0.35."""
-        return self._parameters.threshold or self._session.metadata_threshold() or _DEFAULT_THRESHOLD
+        """The score that objects need: the parameter's, else the one in the model's metadata, else the layout's."""
+        return self._parameters.threshold or self._session.metadata_threshold() or self.layout.default_threshold
 
     @property
     def second_look(self) -> bool:
@@ -100,28 +102,38 @@ class Detector:
         p, size, threshold = self._parameters, (image.shape[1], image.shape[0]), self.threshold
         least = _FIRST_LOOK_SHARE * threshold if self.second_look else threshold
         found = self.layout.candidates(self._session.run(self._tensor(colour)), self.input_px, least)
-        chosen = np.arange(len(found.scores))
         if self._wanted is not None:
-            chosen = chosen[np.isin(found.class_ids, self._wanted)]
+            found = found.rows(np.isin(found.class_ids, self._wanted))
         if self.layout.suppressed:
-            chosen = chosen[np.argsort(-found.scores[chosen], kind="stable")][: p.max_objects]
+            found = found.rows(np.argsort(-found.scores, kind="stable")[: p.max_objects])
         else:
-            candidates = (found.xyxy[chosen], found.scores[chosen], found.class_ids[chosen])
-            chosen = chosen[suppress(*candidates, p.iou_threshold, p.max_objects)]
-        boxes = self._letterboxes[size].to_source(found.xyxy[chosen])
-        scores, ids = found.scores[chosen], found.class_ids[chosen]
+            found = found.rows(suppress(found.xyxy, found.scores, found.class_ids, p.iou_threshold, p.max_objects))
+        found = _to_source(found, self._letterboxes[size])
         if self.second_look:
-            boxes, scores = look_again(colour, boxes, scores, ids, size[0] / self.input_px[0], self._detect_in_crops)
+            found = look_again(colour, found, size[0] / self.input_px[0], self._detect_in_crops)
             # After it, two boxes may be the same object's.
-            kept = suppress(boxes, scores, ids, p.iou_threshold, p.max_objects)
-            kept = kept[scores[kept] >= threshold]
-            boxes, scores, ids = boxes[kept], scores[kept], ids[kept]
-        return make_detections(boxes, scores, ids, self.class_names, size)
+            found = found.rows(suppress(found.xyxy, found.scores, found.class_ids, p.iou_threshold, p.max_objects))
+            found = found.rows(found.scores >= threshold)
+        return make_detections(found.xyxy, found.scores, found.class_ids, self.class_names, size, found.landmarks)
+
+    def _recognised(self, wanted: str, named: int, given: int) -> Layout:
+        """Return the layout; the number of names in a labels file counts only where nothing else decides.
+
+        `named` and `given` are how many names the metadata and the labels file hold.
+        """
+        warm_up = self._warm_up(named or None)
+        try:
+            return find_layout(warm_up, wanted)
+        except ModelLayoutError:
+            if named or not given:
+                raise
+            return find_layout(replace(warm_up, class_count=given), wanted)
 
     def _warm_up(self, class_count: int | None) -> WarmUp:
-        # Range and order of the channels do not change the outputs' shapes.
-        any_order = Preprocessing("rgb", True, "letterbox")
-        outputs = self._session.run(any_order.tensor([_grey(self.input_px)], self._session.input.dtype))
+        # Range and order of the channels change neither the outputs' shapes nor what recognition looks for in them.
+        dtype = self._session.input.dtype
+        any_order = Preprocessing("rgb", dtype != np.uint8, "letterbox")
+        outputs = self._session.run(any_order.tensor([warm_up_picture(self.input_px)], dtype))
         return WarmUp(self._session.output_names, outputs, self.input_px, self._session.metadata, class_count)
 
     def _detect_in_crops(self, crops: list[NDArray[np.uint8]]) -> list[Candidates]:
@@ -146,7 +158,15 @@ class Detector:
         size = (colour.shape[1], colour.shape[0])
         if size not in self._letterboxes:
             self._letterboxes = {size: Letterbox.fit(size, self.input_px, self.preprocessing.resize)}
-        return self.preprocessing.tensor([self._letterboxes[size].place(colour)], self._session.input.dtype)
+        return self.preprocessing.tensor(
+            [self._letterboxes[size].place(colour, self.preprocessing.border)], self._session.input.dtype
+        )
+
+
+def _to_source(found: Candidates, letterbox: Letterbox) -> Candidates:
+    """Return candidates in raw pixels of the image."""
+    landmarks = None if found.landmarks is None else letterbox.points_to_source(found.landmarks)
+    return Candidates(letterbox.to_source(found.xyxy), found.scores, found.class_ids, landmarks)
 
 
 def _grey(size_px: tuple[int, int]) -> NDArray[np.uint8]:

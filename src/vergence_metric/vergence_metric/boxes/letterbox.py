@@ -14,7 +14,7 @@ RESIZES = ("letterbox", "stretch", "corner")
 """With borders all round (YOLOv5 to 11), without borders, or with borders right and below (YOLOX)."""
 
 BORDER_GREY = 114
-"""Of what lies beyond the image in the network's input."""
+"""Of what lies beyond the image in the input of most networks."""
 
 
 @dataclass(frozen=True)
@@ -47,22 +47,25 @@ class Letterbox:
         """Input pixels per source pixel, across and down."""
         return self.fitted_px[0] / self.source_px[0], self.fitted_px[1] / self.source_px[1]
 
-    def place(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return the input picture (height, width, 3) of an image (h, w, 3) of the source size."""
+    def place(self, image: NDArray[np.uint8], border: int = BORDER_GREY) -> NDArray[np.uint8]:
+        """Return the input picture (height, width, 3) of an image (h, w, 3) of the source size; grey beyond it."""
         fitted = image
         if self.fitted_px != self.source_px:
             fitted = np.asarray(cv2.resize(image, self.fitted_px, interpolation=cv2.INTER_LINEAR))
         if self.fitted_px == self.input_px:
             return fitted
-        picture = np.full((self.input_px[1], self.input_px[0], 3), BORDER_GREY, np.uint8)
+        picture = np.full((self.input_px[1], self.input_px[0], 3), border, np.uint8)
         (left, top), (width, height) = self.offset_px, self.fitted_px
         picture[top : top + height, left : left + width] = fitted
         return picture
 
     def to_source(self, xyxy_input: NDArray[Any]) -> NDArray[np.float64]:
         """Return boxes (N, 4) in raw pixels of the source from boxes in the input's (counted from its corner)."""
-        boxes = np.asarray(xyxy_input, np.float64).reshape(-1, 4)
-        return (boxes - self.offset_px * 2) / (self.scale * 2) - 0.5
+        return self.points_to_source(np.asarray(xyxy_input).reshape(-1, 2, 2)).reshape(-1, 4)
+
+    def points_to_source(self, points_input: NDArray[Any]) -> NDArray[np.float64]:
+        """Return points (..., 2) in raw pixels of the source from points in the input's (counted from its corner)."""
+        return (np.asarray(points_input, np.float64) - self.offset_px) / self.scale - 0.5
 
     def to_input(self, xyxy_px: NDArray[Any]) -> NDArray[np.float64]:
         """Return boxes (N, 4) in the input's pixels from boxes in raw pixels of the source."""

@@ -13,12 +13,15 @@ from vergence_metric.boxes.corner_metric import corner_metric, hidden_sides
 from vergence_metric.boxes.detections import Box, Detections
 from vergence_metric.boxes.detector import Detector
 from vergence_metric.boxes.errors import DetectorImageError
-from vergence_metric.boxes.following import Choice, TargetMemory
+from vergence_metric.boxes.motion import MOTION_CLASS, MotionDetector, outside_of
+from vergence_metric.boxes.object_tracks import ObjectTracks
 from vergence_metric.boxes.pair_geometry import PairGeometry
 from vergence_metric.boxes.parameters import BoxMetricParameters
 from vergence_metric.boxes.refinement import refine
 from vergence_metric.boxes.result import NAN2, UNREFINED, BoxStatus, BoxVergenceResult
-from vergence_metric.boxes.smoothing import LagLimitedFilter
+from vergence_metric.boxes.seen_object import ObjectBoxes
+from vergence_metric.boxes.smoothing import LagLimitedFilter, smoothed_pair
+from vergence_metric.boxes.target_choice import RequestedObject, TargetChoice
 from vergence_metric.boxes.target_point import TargetPoint, locate
 from vergence_metric.boxes.uncertainty import direction_sigma_px, disparity_sigma_px
 from vergence_metric.disparity.angular_disparity import angular_disparity
@@ -50,7 +53,9 @@ class BoxMeasurement:
         """Load the detector that the parameters name, on `threads` threads, unless one is given; raises its errors."""
         self.detector = detector or Detector(parameters.detector, threads)
         self._kinematics = kinematics
-        self._memory = TargetMemory(parameters.follow)
+        self._tracks = ObjectTracks(parameters.follow)
+        self._choice = TargetChoice(parameters.follow, self._tracks, frozenset({MOTION_CLASS}))
+        self._motion = MotionDetector(parameters.motion), MotionDetector(parameters.motion)
         self._vertical_px, self._vertical_count = 0.0, 0
         self._parameters = parameters
         self._filter = LagLimitedFilter(parameters.measurement.smoothing_lag_s)
@@ -60,10 +65,16 @@ class BoxMeasurement:
         if parameters == self._parameters:
             return
         self.detector.set_parameters(parameters.detector)
-        self._memory.parameters = parameters.follow
+        self._tracks.parameters = self._choice.parameters = parameters.follow
+        for motion in self._motion:
+            motion.parameters = parameters.motion
         if parameters.measurement.smoothing_lag_s != self._parameters.measurement.smoothing_lag_s:
             self._filter = LagLimitedFilter(parameters.measurement.smoothing_lag_s)
         self._parameters = parameters
+
+    def request(self, requested: RequestedObject) -> None:
+        """Choose the target as requested from the next pair on."""
+        self._choice.request(requested)
 
     def measure(
         self,
@@ -104,37 +115,58 @@ class BoxMeasurement:
     ) -> BoxVergenceResult:
         """Return metric II of what was detected in a pair; see `measure`."""
         geometry = PairGeometry(*models, eyes, self._kinematics) if models is not None and eyes is not None else None
-        expected = self._memory.expected(stamp_s, geometry)
+        left, right = (self._with_motion(eye, images[eye], seen[eye].boxes(), stamp_s, eyes) for eye in (0, 1))
         found = associate(
-            seen[0].boxes(),
-            seen[1].boxes(),
+            left,
+            right,
             self._parameters.association,
             self._vertical_px,
             images,
             geometry,
-            expected,
+            self._tracks.expected(self._choice.target_id, stamp_s, geometry),
         )
-        choice = self._memory.choose(found, stamp_s, seen[0].image_size_px, geometry)
-        if choice.pair is None:
+        objects = self._tracks.update(found, stamp_s, images, geometry)
+        choice = self._choice.choose(objects, stamp_s, seen[0].image_size_px)
+        result = self._measured(choice.target.boxes if choice.target else None, images, seen, stamp_s, geometry, models)
+        return replace(result, target=choice.target, choice_reason=choice.reason, objects=tuple(objects))
+
+    def _with_motion(
+        self, eye: int, image: NDArray[Any], boxes: list[Box], stamp_s: float, eyes: EyeAngles | None
+    ) -> list[Box]:
+        if not self._parameters.motion.enable:
+            return boxes
+        pose_rad = None if eyes is None else (eyes.pan_right_rad if eye else eyes.pan_left_rad, eyes.tilt_rad)
+        return [*boxes, *outside_of(self._motion[eye].detect(image, stamp_s, pose_rad), boxes)]
+
+    def _measured(
+        self,
+        boxes: ObjectBoxes | None,
+        images: tuple[NDArray[Any], NDArray[Any]],
+        seen: tuple[Detections, Detections],
+        stamp_s: float,
+        geometry: PairGeometry | None,
+        models: Models | None,
+    ) -> BoxVergenceResult:
+        if boxes is None or boxes.pair is None:
             self._filter.reset()
-            return self._one_eyed(choice, seen, models)
-        if choice.pair.ambiguous:
+            return self._one_eyed(boxes or ObjectBoxes(), seen, models)
+        if boxes.pair.ambiguous:
             self._filter.reset()
-            only_left = self._one_eyed(Choice(left=choice.pair.left), seen, models)
+            only_left = self._one_eyed(ObjectBoxes(left=boxes.left), seen, models)
             return replace(
                 only_left,
-                right=choice.pair.right,
+                right=boxes.right,
                 status=BoxStatus.AMBIGUOUS,
                 reason="another box of this class fits the target's about as well",
             )
-        return self._paired(choice.pair, images, seen, stamp_s, geometry, models)
+        return self._paired(boxes.pair, images, seen, stamp_s, geometry, models)
 
     def _one_eyed(
-        self, choice: Choice, seen: tuple[Detections, Detections], models: Models | None
+        self, boxes: ObjectBoxes, seen: tuple[Detections, Detections], models: Models | None
     ) -> BoxVergenceResult:
-        if choice.left is not None:
+        if boxes.left is not None:
             status, reason = BoxStatus.LEFT_ONLY, "the right eye does not see it"
-        elif choice.right is not None:
+        elif boxes.right is not None:
             status, reason = BoxStatus.RIGHT_ONLY, "the left eye does not see it"
         else:
             status, reason = BoxStatus.NO_TARGET, "neither eye sees a target"
@@ -142,10 +174,10 @@ class BoxMeasurement:
             status,
             reason,
             *seen,
-            left=choice.left,
-            right=choice.right,
-            left_rad=_angles(models and models[0], choice.left),
-            right_rad=_angles(models and models[1], choice.right),
+            left=boxes.left,
+            right=boxes.right,
+            left_rad=_angles(models and models[0], boxes.left),
+            right_rad=_angles(models and models[1], boxes.right),
         )
 
     def _paired(
@@ -189,12 +221,12 @@ class BoxMeasurement:
             refined=replace(refined, horizontal_px=surface_px[0], vertical_px=surface_px[1]),
             left_rad=_angles(models and models[0], left),
             right_rad=_angles(models and models[1], right),
-            point=self._located(left, metric.center_px, refined, sigma_px, source_per_input, geometry),
+            point=self._located((left, right), metric.center_px, refined, sigma_px, source_per_input, geometry),
         )
 
     def _located(
         self,
-        left: Box,
+        boxes: tuple[Box, Box],
         center_px: NDArray[np.float64],
         refined: Any,
         sigma_px: float,
@@ -203,26 +235,24 @@ class BoxMeasurement:
     ) -> TargetPoint | None:
         if geometry is None:
             return None
+        left, right = boxes
         disparity = (refined.horizontal_px, refined.vertical_px)
         sigma = refined.sigma_px
         if not math.isfinite(disparity[0]):
-            disparity, sigma = (float(center_px[0]), float(center_px[1])), sigma_px
+            landmarks = bool(left.landmarks_px and right.landmarks_px)
+            disparity = tuple(np.subtract(left.point_px, right.point_px) if landmarks else center_px)
+            sigma = sigma_px
         if not all(math.isfinite(value) for value in disparity):
             return None
-        right_px = left.center_px[0] - disparity[0], left.center_px[1] - disparity[1]
+        x, y = left.point_px
+        right_px = x - float(disparity[0]), y - float(disparity[1])
         sigmas = (direction_sigma_px(left, source_per_input), sigma, JOINT_SIGMA_RAD)
-        return locate(
-            left.center_px, right_px, (geometry.left, geometry.right), geometry.eyes, self._kinematics, sigmas
-        )
+        return locate((x, y), right_px, (geometry.left, geometry.right), geometry.eyes, self._kinematics, sigmas)
 
     def _smoothed(self, pair: BoxPair, stamp_s: float) -> tuple[Box, Box]:
         if self._parameters.measurement.smoothing_lag_s == 0.0:
             return pair.left, pair.right
-        sides = self._filter.update(stamp_s, np.array([*pair.left.xyxy_px, *pair.right.xyxy_px]))
-        return (
-            replace(pair.left, xyxy_px=(float(sides[0]), float(sides[1]), float(sides[2]), float(sides[3]))),
-            replace(pair.right, xyxy_px=(float(sides[4]), float(sides[5]), float(sides[6]), float(sides[7]))),
-        )
+        return smoothed_pair(self._filter, stamp_s, pair.left, pair.right)
 
     def _update_vertical(self, offset_px: float) -> None:
         """Update the mounts' vertical offset by a complete pair: the mean of the first ones, then a slow low pass."""
@@ -253,7 +283,7 @@ def measure_pair(
 def _angles(model: CameraModel | None, box: Box | None) -> tuple[float, float]:
     if model is None or box is None:
         return NAN2
-    azimuth, elevation = model.angles([box.center_px])[0]
+    azimuth, elevation = model.angles([box.point_px])[0]
     return float(azimuth), float(elevation)
 
 

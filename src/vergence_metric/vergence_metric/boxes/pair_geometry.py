@@ -37,6 +37,11 @@ class PairGeometry:
         u, _ = self.pixel(False, self.direction(True, left_px))
         return left_px[0] - u if math.isfinite(u) else -math.inf
 
+    def parallax_rad(self, left_px: Pixel, right_px: Pixel) -> float:
+        """Return by how much the right eye must be turned further to the left than the left one to see one point."""
+        left, right = self.direction(True, left_px), self.direction(False, right_px)
+        return math.atan2(right[1], right[0]) - math.atan2(left[1], left[0])
+
     def vertical_px(self, left_px: Pixel, right_x_px: float) -> float:
         """Return y_left - y_right of the point seen at a left pixel and at a column of the right image.
 

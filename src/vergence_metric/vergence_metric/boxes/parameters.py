@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from vergence_metric.boxes.follow_parameters import FollowParameters, MotionParameters
 from vergence_metric.boxes.layouts import AUTO, layout_names
 from vergence_metric.boxes.letterbox import RESIZES
 from vergence_metric.boxes.preprocessing import COLORS, SCALES
@@ -31,8 +32,8 @@ class DetectorParameters(Parameters):
     )
     threshold: float = parameter(
         0.0,
-        "least score of an object; 0 takes the one in the model's metadata, else 0.35. An export with suppression "
-        "inside has its own threshold, which this one can only raise",
+        "least score of an object; 0 takes the one in the model's metadata, else 0.35, of YuNet 0.6. An export with "
+        "suppression inside has its own threshold, which this one can only raise",
         minimum=0.0,
         maximum=1.0,
         formerly="threshold",
@@ -83,6 +84,12 @@ class DetectorParameters(Parameters):
         choices=_layout_choices,
         read_only=True,
         formerly="layout",
+    )
+    labels: str = parameter(
+        "",
+        "file of the classes' names: one a line, or 'names' in a YAML or JSON file; coco for the 80 classes of COCO; "
+        "empty takes those in the model's metadata, else COCO's for a model of 80 classes, else numbers",
+        read_only=True,
     )
     color: str = parameter(
         "auto",
@@ -170,29 +177,6 @@ class AssociationParameters(Parameters):
 
 
 @dataclass(frozen=True)
-class FollowParameters(Parameters):
-    """How the target is recognised from one pair of images to the next."""
-
-    gate_px: float = parameter(
-        60.0,
-        "largest distance from the target's expected place at which an object still counts as the target",
-        unit="px",
-        minimum=1.0,
-        maximum=1000.0,
-        formerly="follow_gate_px",
-    )
-    forget_after_s: float = parameter(
-        1.0,
-        "a target that is not seen for this long is given up, and the best object near the image's middle becomes the "
-        "target",
-        unit="s",
-        minimum=0.0,
-        maximum=60.0,
-        formerly="forget_s",
-    )
-
-
-@dataclass(frozen=True)
 class BoxMeasurementParameters(Parameters):
     """How the target's pair of boxes is measured."""
 
@@ -225,6 +209,7 @@ class BoxMetricParameters:
     detector: DetectorParameters = field(default_factory=DetectorParameters)
     association: AssociationParameters = field(default_factory=AssociationParameters)
     follow: FollowParameters = field(default_factory=FollowParameters)
+    motion: MotionParameters = field(default_factory=MotionParameters)
     measurement: BoxMeasurementParameters = field(default_factory=BoxMeasurementParameters)
 
 
@@ -255,5 +240,6 @@ GROUPS: Groups = (
     ("detector.", DetectorParameters),
     ("association.", AssociationParameters),
     ("follow.", FollowParameters),
+    ("motion.", MotionParameters),
     ("measurement.", BoxMeasurementParameters),
 )

@@ -1,4 +1,4 @@
-"""How a fitted picture becomes the network's input tensor: order and range of its channels."""
+"""How a fitted picture becomes the network's input tensor: order and range of its channels, grey of its borders."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.boxes.letterbox import BORDER_GREY
+
 COLORS = ("rgb", "bgr")
 SCALES = ("unit", "byte")
 """Values from 0 to 1, or from 0 to 255."""
@@ -15,11 +17,15 @@ SCALES = ("unit", "byte")
 
 @dataclass(frozen=True)
 class Preprocessing:
-    """Order of the channels (one of COLORS), whether values are 0..1, and the resize (see `letterbox.RESIZES`)."""
+    """Order of the channels (one of COLORS), whether values are 0..1, the resize (see `letterbox.RESIZES`).
+
+    `border` is the grey level of what lies beyond the image.
+    """
 
     color: str
     unit_scale: bool
     resize: str
+    border: int = BORDER_GREY
 
     def overridden(self, color: str, scale: str, resize: str) -> "Preprocessing":
         """Return this with what is not "auto" replaced; `scale` is one of SCALES."""
@@ -27,6 +33,7 @@ class Preprocessing:
             self.color if color == "auto" else color,
             self.unit_scale if scale == "auto" else scale == "unit",
             self.resize if resize == "auto" else resize,
+            self.border,
         )
 
     def tensor(self, pictures: Sequence[NDArray[np.uint8]], dtype: Any) -> NDArray[Any]:

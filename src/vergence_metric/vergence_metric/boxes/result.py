@@ -9,6 +9,7 @@ import numpy as np
 from vergence_metric.boxes.corner_metric import CornerMetric
 from vergence_metric.boxes.detections import Box, Detections
 from vergence_metric.boxes.refinement import Refinement
+from vergence_metric.boxes.seen_object import SeenObject
 from vergence_metric.boxes.target_point import TargetPoint
 
 NAN2 = (math.nan, math.nan)
@@ -40,8 +41,9 @@ class BoxVergenceResult:
     differences in raw pixels. `center_px`, `refined` are disparities of the boxes' centres and of the surface (mean
     over what both eyes see), (horizontal, vertical), without lens distortion if camera models are given; `center_rad`
     is the centres' in angle. `sigma_px` is the standard deviation of the horizontal `center_px`. `left_rad` and
-    `right_rad` are the target's directions in each eye, azimuth (right positive) and elevation (down positive).
-    `point` is where it is in rig_base, None if unknown.
+    `right_rad` are the directions of the target's point (`Box.point_px`) in each eye, azimuth (right positive) and
+    elevation (down positive). `point` is where it is in rig_base, None if unknown. `objects` are all that are in view,
+    `target` is the chosen one of them, None without one, and `choice_reason` says why.
     """
 
     status: BoxStatus
@@ -58,6 +60,14 @@ class BoxVergenceResult:
     left_rad: tuple[float, float] = NAN2
     right_rad: tuple[float, float] = NAN2
     point: TargetPoint | None = None
+    target: SeenObject | None = None
+    choice_reason: str = ""
+    objects: tuple[SeenObject, ...] = ()
+
+    @property
+    def object_id(self) -> int:
+        """The target's id, 0 without a target."""
+        return self.target.object_id if self.target else 0
 
     @property
     def class_name(self) -> str:

@@ -77,46 +77,46 @@ class Window:
             np.uint8,
         )
 
-    def to_image(self, xyxy: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return boxes (N, 4) in raw image pixels."""
-        return xyxy * self.scale + np.array([self.x, self.y, self.x, self.y]) - 0.5
+    def to_image(self, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return boxes (N, 4) or points (N, 2) in raw image pixels."""
+        return corners * self.scale + np.tile([self.x, self.y], corners.shape[-1] // 2) - 0.5
 
 
 def look_again(
     image: NDArray[np.uint8],
-    xyxy_px: NDArray[np.float64],
-    scores: NDArray[np.float64],
-    class_ids: NDArray[np.int64],
+    seen: Candidates,
     first_scale: float,
     detect: Callable[[list[NDArray[np.uint8]]], Sequence[Candidates]],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return boxes (N, 4) and scores (N,) after a second look at the best ones.
+) -> Candidates:
+    """Return the candidates after a second look at the best ones.
 
     A box's score becomes the mean over both looks; a second look that does not find it with its class counts as 0. Its
-    sides become their mean, weighted as if each look erred by the same share of its own pixels.
+    sides and landmarks become their mean, weighted as if each look erred by the same share of its own pixels.
 
     Args:
         image: (h, w, 3) BGR.
-        xyxy_px: boxes in its pixels, best first.
-        scores: theirs.
-        class_ids: theirs.
+        seen: boxes and landmarks in its pixels, best first.
         first_scale: image pixels per pixel of the first look.
         detect: returns for each of several pictures of CROP_PX all candidates, down to low scores.
 
     """
-    boxes, means = xyxy_px.copy(), scores.copy()
-    windows = [Window.about(box, (image.shape[1], image.shape[0])) for box in xyxy_px[:MOST_LOOKS]]
+    boxes, means = seen.xyxy.copy(), seen.scores.copy()
+    landmarks = None if seen.landmarks is None else seen.landmarks.copy()
+    windows = [Window.about(box, (image.shape[1], image.shape[0])) for box in seen.xyxy[:MOST_LOOKS]]
     found = detect([window.of(image) for window in windows]) if windows else []
     for i, (window, candidates) in enumerate(zip(windows, found, strict=True)):
         again = window.to_image(candidates.xyxy)
-        same = (_overlaps(again, xyxy_px[i]) >= _SAME_OBJECT_IOU) & (candidates.class_ids == class_ids[i])
-        means[i] = 0.5 * scores[i]
+        same = (_overlaps(again, seen.xyxy[i]) >= _SAME_OBJECT_IOU) & (candidates.class_ids == seen.class_ids[i])
+        means[i] = 0.5 * seen.scores[i]
         if same.any():
             best = int(np.flatnonzero(same)[candidates.scores[same].argmax()])
             means[i] += 0.5 * float(candidates.scores[best])
             share = first_scale**2 / (first_scale**2 + window.scale**2)
-            boxes[i] = (1.0 - share) * xyxy_px[i] + share * again[best]
-    return boxes, means
+            boxes[i] = (1.0 - share) * seen.xyxy[i] + share * again[best]
+            if landmarks is not None and candidates.landmarks is not None:
+                points = window.to_image(candidates.landmarks[best])
+                landmarks[i] = (1.0 - share) * landmarks[i] + share * points
+    return Candidates(boxes, means, seen.class_ids, landmarks)
 
 
 def _overlaps(boxes: NDArray[np.float64], box: NDArray[np.float64]) -> NDArray[Any]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.boxes.class_names import names_of
 from vergence_metric.boxes.errors import DetectorError, ModelFileError, ModelLayoutError
 from vergence_rig.install_hint import install_hint
 from vergence_rig.regular_file import FileError, check_regular_file, expanded
@@ -103,13 +104,9 @@ class ModelSession:
         text = self.metadata.get("names", "")
         for parse in (json.loads, ast.literal_eval):
             try:
-                value = parse(text)
+                return names_of(parse(text))
             except (ValueError, SyntaxError):
                 continue
-            if isinstance(value, dict):
-                value = [value[key] for key in sorted(value, key=int)]
-            if isinstance(value, (list, tuple)):
-                return tuple(str(name) for name in value)
         return ()
 
     def stride_px(self) -> int:

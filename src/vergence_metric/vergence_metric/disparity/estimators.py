@@ -1,7 +1,7 @@
 """The estimators that ship with the package, and the one that the parameters choose."""
 
 from vergence_metric.disparity.affine import measure_affine
-from vergence_metric.disparity.cepstral import measure_cepstral
+from vergence_metric.disparity.cepstral import CepstralEstimator
 from vergence_metric.disparity.depth_policy import DepthPolicyEstimator
 from vergence_metric.disparity.edge_shift import measure_edge_shift
 from vergence_metric.disparity.gabor import measure_gabor
@@ -18,7 +18,7 @@ register_estimator("affine", shared_search(measure_affine))
 register_estimator("zncc", shared_search(measure_zncc))
 register_estimator("edge_shift", shared_search(measure_edge_shift))
 register_estimator("phase", shared_search(measure_phase))
-register_estimator("cepstral", shared_search(measure_cepstral))
+register_estimator(CepstralEstimator.name, CepstralEstimator)
 register_estimator("gabor", shared_search(measure_gabor))
 
 

@@ -15,6 +15,7 @@ from vergence_metric.measurement.edge_metric import AlignedPair, EdgeMetric, Edg
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.tracking.eye_view import EyeView
+from vergence_metric.tracking.motion.awaited_motion import AwaitedMotion
 from vergence_metric.tracking.protocol import Tracker
 from vergence_metric.tracking.registry import make_tracker
 from vergence_metric.tracking.request import PairMemory, StoredPair, TrackRequest
@@ -50,6 +51,7 @@ class PairMeasurement:
         self._camera: CameraModel | None = None
         self._memory = PairMemory(parameters.tracker.memory_s)
         self._requests: deque[tuple[TrackRequest, SeenPair | None]] = deque()
+        self._awaited_motion: AwaitedMotion | None = None
         self._ids_used = 0
         self._newest_id = 0
         self.unmet_request = ""
@@ -145,7 +147,14 @@ class PairMeasurement:
             self._camera, self._ids_used = camera, self._newest_id
             self._tracker = make_tracker(self._parameters.tracker, self._estimator, camera, self._kinematics)
         self._pass_on_requests(self._tracker, edge, camera)
-        self._store(edge, stamp_s, self._views(camera, eyes))
+        pair = self._store(edge, stamp_s, self._views(camera, eyes))
+        if self._awaited_motion is not None:
+            found = self._awaited_motion.update(pair)
+            if isinstance(found, str):
+                waiting = Track.nowhere(self._newest_id, TrackStatus.LOST, f"waiting for something that moves: {found}")
+                return replace(waiting, goal_id=self._awaited_motion.goal_id)
+            self._awaited_motion = None
+            self._tracker.request(found, pair)
         track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes, samples)
         self._newest_id = self._ids_used + track.track_id
         return replace(track, track_id=self._newest_id)
@@ -157,8 +166,12 @@ class PairMeasurement:
         )
         return left, right
 
-    def _store(self, pair: AlignedPair | EdgeMetricResult, stamp_s: float, views: tuple[EyeView, EyeView]) -> None:
-        self._memory.add(StoredPair(stamp_s, pair.left_grey, pair.right_grey, views))
+    def _store(
+        self, pair: AlignedPair | EdgeMetricResult, stamp_s: float, views: tuple[EyeView, EyeView]
+    ) -> StoredPair:
+        stored = StoredPair(stamp_s, pair.left_grey, pair.right_grey, views)
+        self._memory.add(stored)
+        return stored
 
     def _stored(
         self, request: TrackRequest, seen: SeenPair | None, camera: CameraModel, by: Alignment
@@ -173,6 +186,9 @@ class PairMeasurement:
     def _pass_on_requests(self, tracker: Tracker, edge: EdgeMetricResult, camera: CameraModel) -> None:
         while self._requests:
             (request, seen), self.unmet_request = self._requests.popleft(), ""
+            self._awaited_motion = AwaitedMotion(request.goal_id) if request.motion else None
+            if request.motion:
+                continue
             if not request.goal_id:
                 tracker.lock_here()
                 continue

@@ -1,13 +1,15 @@
 """Parameters of edge_metric_node: one group for each part of the measurement."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from vergence_metric.alignment.parameters import AlignmentParameters
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.edges.parameters import ContrastParameters, EdgeParameters
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.tracking.parameters import TrackerParameters
-from vergence_rig.parameters import Groups, parameter
+from vergence_rig.parameters import Groups, parameter, replaced_groups
 from vergence_rig.verged import VergedLimits
 
 
@@ -36,9 +38,7 @@ class PairMeasurementParameters:
     tracker: TrackerParameters = field(default_factory=TrackerParameters)
 
 
-GROUPS: Groups = (
-    ("", StereoParameters),
-    ("pair.", PairingParameters),
+_PAIR: Groups = (
     ("edges.", EdgeParameters),
     ("contrast.", ContrastParameters),
     ("align.", AlignmentParameters),
@@ -46,3 +46,14 @@ GROUPS: Groups = (
     ("disparity.", DisparityParameters),
     ("tracker.", TrackerParameters),
 )
+
+GROUPS: Groups = (("", StereoParameters), ("pair.", PairingParameters), *_PAIR)
+
+
+def pair_measurement_parameters(values: Mapping[str, Any]) -> PairMeasurementParameters:
+    """Return the parameters with some values changed by their full names, such as "edges.windows_px".
+
+    Raises ParameterError, with the full name, for an unknown name or an invalid value.
+    """
+    groups: tuple[Any, ...] = replaced_groups(_PAIR, values)
+    return PairMeasurementParameters(*groups)

@@ -10,8 +10,10 @@ from std_msgs.msg import Header
 
 from vergence_metric.boxes.detections import Box, Detections
 from vergence_metric.boxes.result import BoxVergenceResult
+from vergence_metric.boxes.seen_object import SeenObject
+from vergence_metric.boxes.target_choice import RequestedObject
 from vergence_metric.boxes.target_point import TargetPoint
-from vergence_msgs.msg import BoundingBox, BoxVergence, StereoDetections
+from vergence_msgs.msg import BoundingBox, BoxVergence, DetectedObject, ObjectRequest, StereoDetections
 from vergence_rig.eye_image import EyeImage
 
 POINT_FRAME = "rig_base"
@@ -20,8 +22,8 @@ POINT_FRAME = "rig_base"
 def box_message(box: Box | None) -> BoundingBox:
     """Return a box as a message; all NaN for None."""
     if box is None:
-        nan = math.nan
-        return BoundingBox(x_min_px=nan, y_min_px=nan, x_max_px=nan, y_max_px=nan, score=nan, class_id=-1)
+        figures = ("x_min_px", "y_min_px", "x_max_px", "y_max_px", "score", "point_x_px", "point_y_px")
+        return BoundingBox(class_id=-1, **dict.fromkeys(figures, math.nan))
     x_min, y_min, x_max, y_max = box.xyxy_px
     return BoundingBox(
         x_min_px=x_min,
@@ -35,15 +37,40 @@ def box_message(box: Box | None) -> BoundingBox:
         cut_top=box.cut[1],
         cut_right=box.cut[2],
         cut_bottom=box.cut[3],
+        point_x_px=box.point_px[0],
+        point_y_px=box.point_px[1],
+        landmarks_x_px=[x for x, _ in box.landmarks_px],
+        landmarks_y_px=[y for _, y in box.landmarks_px],
     )
 
 
-def box_vergence_message(result: BoxVergenceResult, header: Header, pair_skew_s: float) -> BoxVergence:
-    """Return metric II of a pair; `header` is the left image's."""
+def object_message(one: SeenObject, focal_px: float) -> DetectedObject:
+    """Return an object in view; `focal_px` is the left camera's, NaN if unknown."""
+    return DetectedObject(
+        object_id=one.object_id,
+        class_name=one.class_name,
+        score=one.boxes.score,
+        version_rad=one.version_rad,
+        tilt_rad=one.tilt_rad,
+        distance_m=one.distance_m,
+        size_rad=one.size_px / focal_px,
+    )
+
+
+def requested_object(message: ObjectRequest) -> RequestedObject:
+    """Return what is to be the target."""
+    return RequestedObject(message.class_name, message.object_id)
+
+
+def box_vergence_message(
+    result: BoxVergenceResult, header: Header, pair_skew_s: float, focal_px: float = math.nan
+) -> BoxVergence:
+    """Return metric II of a pair; `header` is the left image's, `focal_px` the left camera's, NaN if unknown."""
     there, back = (
         [float(value) for value in values]
         for values in (result.corners.left_minus_right_px, result.corners.right_minus_left_px)
     )
+    distances_m = result.point.interval_m if result.point is not None else (math.nan, math.nan)
     return BoxVergence(
         header=header,
         pair_skew_s=pair_skew_s,
@@ -71,7 +98,13 @@ def box_vergence_message(result: BoxVergenceResult, header: Header, pair_skew_s:
         left_elevation_rad=result.left_rad[1],
         right_azimuth_rad=result.right_rad[0],
         right_elevation_rad=result.right_rad[1],
+        distance_m=result.point.distance_m if result.point is not None else math.nan,
+        distance_low_m=distances_m[0],
+        distance_high_m=distances_m[1],
         class_name=result.class_name,
+        object_id=result.object_id,
+        choice_reason=result.choice_reason,
+        objects=[object_message(one, focal_px) for one in result.objects],
         status=int(result.status),
         reason=result.reason,
     )

@@ -1,5 +1,6 @@
 """box_metric_node: pairs of images in, the target's boxes in both eyes, metric II and the target's place out."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,8 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
 from vergence_metric.boxes import BoxMeasurement, BoxVergenceResult, DetectorError, draw
+from vergence_metric.boxes.follow_parameters import FollowParameters, MotionParameters
+from vergence_metric.boxes.motion import MOTION_CLASS
 from vergence_metric.boxes.parameters import (
     GROUPS,
     AssociationParameters,
@@ -21,7 +24,6 @@ from vergence_metric.boxes.parameters import (
     BoxMetricNodeParameters,
     BoxMetricParameters,
     DetectorParameters,
-    FollowParameters,
 )
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters
@@ -29,12 +31,13 @@ from vergence_metric.ros.box_messages import (
     box_vergence_message,
     detections_message,
     point_message,
+    requested_object,
     vision_message,
     vision_type,
 )
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import IdealPair, ImagePair, StereoInput
-from vergence_msgs.msg import BoxVergence, DetectorClasses, StereoDetections
+from vergence_msgs.msg import BoxVergence, DetectorClasses, ObjectRequest, StereoDetections
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.parameters import ParameterError
 from vergence_rig.rig_file import load_rig
@@ -78,6 +81,12 @@ class BoxMetricNode(MetricNode):
             self, settings, pairing, diagnostics, qos, self._on_pair, self._rig, images=self._images
         )
         self._joint_input = self._subscribe_joints(diagnostics, qos)
+        qos.create_subscription(
+            ObjectRequest,
+            "vergence/object_request",
+            lambda message: self._measurement.request(requested_object(message)),
+            latched,
+        )
         self._settings.add_check(self._check_classes)
         self._settings.on_change(self._on_settings)
         diagnostics.add("detector", self._report)
@@ -92,6 +101,8 @@ class BoxMetricNode(MetricNode):
 
     def _publish_classes(self) -> None:
         classes = self._measurement.detector.classes_of(self._settings.get(DetectorParameters).classes)
+        if self._settings.get(MotionParameters).enable:
+            classes = (*classes, MOTION_CLASS)
         if classes != self._classes:
             self._classes = classes
             header = Header(stamp=self.get_clock().now().to_msg())
@@ -130,7 +141,8 @@ class BoxMetricNode(MetricNode):
     def _publish(self, pair: ImagePair, ideal: IdealPair, result: BoxVergenceResult) -> None:
         header: Header = pair.left.header
         skew_s = pair.skew_ns * 1e-9
-        self._box_publisher.publish(box_vergence_message(result, header, skew_s))
+        focal_px = ideal.cameras[0].fx_px if ideal.cameras is not None else math.nan
+        self._box_publisher.publish(box_vergence_message(result, header, skew_s, focal_px))
         if result.point is not None:
             self._point_publisher.publish(point_message(result.point, header))
         if self._detections_publisher.get_subscription_count():
@@ -164,6 +176,7 @@ def _parameters_of(settings: ParameterSet) -> BoxMetricParameters:
         settings.get(DetectorParameters),
         settings.get(AssociationParameters),
         settings.get(FollowParameters),
+        settings.get(MotionParameters),
         settings.get(BoxMeasurementParameters),
     )
 

@@ -8,7 +8,7 @@ from vergence_common.stamps import to_seconds, to_stamp
 from vergence_metric.disparity.angular_disparity import AngularDisparity
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.tracking.request import TrackRequest
-from vergence_metric.tracking.track import Track
+from vergence_metric.tracking.track import NOWHERE, Track
 from vergence_msgs.msg import TargetTrack
 from vergence_msgs.msg import TrackRequest as TrackRequestMessage
 from vergence_rig.eye_image import EyeImage
@@ -81,6 +81,8 @@ def unusable_track_message(reason: str, header: Header, pair_skew_s: float) -> T
 
 def track_request(message: TrackRequestMessage, images: EyeImages | None) -> TrackRequest:
     """Return the request in pixels of the ideal image; of the one as it was taken without camera models."""
+    if message.motion:
+        return TrackRequest(message.goal_id, to_seconds(message.header.stamp), True, NOWHERE, motion=True)
     left, pixel = message.eye == TrackRequestMessage.EYE_LEFT, (message.x_px, message.y_px)
     if images is not None:
         x_px, y_px = images[0 if left else 1].to_ideal([pixel])[0]

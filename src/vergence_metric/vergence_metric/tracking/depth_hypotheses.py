@@ -47,6 +47,13 @@ class DepthHypotheses:
         weights = [one.weight for one in self.ranked[:2]] + [0.0, 0.0]
         return weights[0] >= max(self._share, _LEAD * weights[1])
 
+    @property
+    def doubt(self) -> str:
+        """Why no distance is certain."""
+        if len(self.ranked) > 1:
+            return "the target may be at one of several distances"
+        return "the target's distance is not certain"
+
     def update(self, candidates: Sequence[tuple[float, float]]) -> Hypothesis | None:
         """Add the candidates of a pair, as (parallax [rad], probability), the answer first; returns its hypothesis."""
         self._pairs += 1

@@ -5,11 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import rotation_rig_from_optical
 
 Pixel = tuple[float, float]
+Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,30 @@ class EyeView:
         if not z > 0.0:
             return math.nan, math.nan
         return self.camera.distorted(x / z, y / z)
+
+    def rays(self, pixels: NDArray[np.floating]) -> Points:
+        """Return the unit directions (N, 3) in rig_base of pixels (N, 2)."""
+        rays = self.camera.pixel_to_ray(pixels) @ self._rig_from_optical.T
+        return np.asarray(rays / np.linalg.norm(rays, axis=1)[:, None])
+
+    def angles(self, pixels: NDArray[np.floating]) -> Points:
+        """Return the angles (N, 2) in rig_base [rad] of pixels (N, 2): pan and tilt of an eye that fixates them."""
+        rays = self.rays(pixels)
+        return np.column_stack([np.arcsin(np.clip(rays[:, 1], -1.0, 1.0)), np.arctan2(-rays[:, 2], rays[:, 0])])
+
+    def pixels(self, angles_rad: Points) -> Points:
+        """Return the pixels (N, 2) of angles (N, 2) as `angles` returns them; NaN behind the eye."""
+        pan, tilt = angles_rad.T
+        cos_pan = np.cos(pan)
+        rays = np.column_stack([np.cos(tilt) * cos_pan, np.sin(pan), -np.sin(tilt) * cos_pan])
+        return np.asarray(self.camera.ray_to_pixel(rays @ self._rig_from_optical))
+
+    def stretch(self, before: "EyeView", at_px: Points) -> Points:
+        """Return what the turn from an earlier view makes of small steps about its pixel (2,), as a matrix (2, 2)."""
+        steps = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+        there = self.pixels(before.angles(at_px + steps))
+        matrix = (there[1:] - there[0]).T
+        return matrix if np.isfinite(matrix).all() else np.eye(2)
 
     @cached_property
     def _rig_from_optical(self) -> np.ndarray:

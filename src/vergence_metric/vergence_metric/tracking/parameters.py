@@ -186,7 +186,7 @@ class TrackerParameters(Parameters):
         maximum=0.1,
     )
     depth_share: float = parameter(
-        0.4,
+        0.47,
         "share of the recent pairs that must speak for a distance of a requested target; below it several may fit",
         minimum=0.3,
         maximum=0.99,

@@ -20,7 +20,7 @@ class Tracker(Protocol):
     def update(
         self, left: Image, right: Image, stamp_s: float, eyes: EyeAngles, samples: Iterable[StampedEyeAngles] = ()
     ) -> Track:
-        """Return where the target is in a pair; see `tracker.TargetTracker.update`."""
+        """Return where the target is in a pair; see `locking_tracker.LockingTracker.update`."""
         ...
 
     def lock_here(self) -> None:

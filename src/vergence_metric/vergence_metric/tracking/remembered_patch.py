@@ -32,8 +32,10 @@ _CANDIDATES = 3
 _APART_PX = 12.0  # two peaks of the context closer than this are one place
 _REFINED_WITHIN_PX = 4
 _LEAST_CONTRAST = 1.0  # standard deviation of a template [grey levels]
-_AS_ALIKE = 0.01  # difference in correlation below which two places look alike
-_PRIOR, _WIDE_PRIOR, _POINT_PRIOR = 0.05, 0.15, 0.03  # similarity by which a place at the rim of its search is worse
+_AS_ALIKE = 0.2  # difference in evidence below which two places look alike
+_PRIOR, _WIDE_PRIOR, _POINT_PRIOR = 0.3, 4.0, 1.0  # evidence by which a place at the rim of its search is worse
+_TAKEN = -99.0  # evidence where a place has been found already
+_NOISE = 0.002  # share of its variance that an image taken again does not explain
 
 Sides = tuple[int, int, int, int]
 
@@ -86,7 +88,8 @@ class RememberedPatch:
         for place, similarity in places:
             pixel, at_point, _ = _best_near(image, template, sides, place, _REFINED_WITHIN_PX)
             off = math.hypot(place[0] - expected[0], place[1] - expected[1]) / reach
-            found.append((similarity + at_point - prior * off**2, similarity, at_point, pixel))
+            evidence = float(_evidence(np.array([similarity, at_point], np.float32)).sum())
+            found.append((evidence - prior * off**2, similarity, at_point, pixel))
         _, similarity, at_point, pixel = max(found)
         sighting = PatchSighting(pixel, similarity, at_point, min(spread_px, wide_spread_px))
         if similarity >= alone_below:
@@ -170,21 +173,22 @@ class RememberedPatch:
         left, top, right, bottom = (scale * (side + reach) for side in sides)
         area = cut(image, at[0] - left, at[1] - top, left + right + scale, top + bottom + scale)
         surface = _correlation(_reduced(area, scale), template)
-        ranked = surface - _cost(surface.shape, prior)
+        evidence = _evidence(surface)
+        ranked = evidence - _cost(surface.shape, prior)
         j, i = divmod(int(ranked.argmax()), ranked.shape[1])
-        rows, columns = np.nonzero(surface >= surface[j, i] - _AS_ALIKE)
+        rows, columns = np.nonzero(evidence >= evidence[j, i] - _AS_ALIKE)
         spread_px = scale * float(np.hypot(rows - j, columns - i).max())
         middle_px = 0.5 * (scale - 1) - scale * reach
         places: list[tuple[Pixel, float]] = []
         apart = max(int(_APART_PX) // scale, 1)
         for _ in range(most):
             j, i = divmod(int(ranked.argmax()), ranked.shape[1])
-            if ranked[j, i] <= -1.0 or surface[j, i] <= 0.0:
+            if ranked[j, i] <= _TAKEN or surface[j, i] <= 0.0:
                 break
             di, dj = peak_offset(ranked, i, j)
             place = (at[0] + scale * (i + di) + middle_px, at[1] + scale * (j + dj) + middle_px)
             places.append((place, float(surface[j, i])))
-            ranked[max(j - apart, 0) : j + apart + 1, max(i - apart, 0) : i + apart + 1] = -2.0
+            ranked[max(j - apart, 0) : j + apart + 1, max(i - apart, 0) : i + apart + 1] = _TAKEN
         return places, spread_px
 
 
@@ -221,10 +225,15 @@ def _best_near(image: Image, template: Image, sides: Sides, place: Pixel, reach:
     x0, y0 = round(place[0]) - left - reach, round(place[1]) - top - reach
     area = cut(image, x0, y0, template.shape[1] + 2 * reach, template.shape[0] + 2 * reach)
     surface = _correlation(area, template)
-    nearest = surface - _cost(surface.shape, _POINT_PRIOR)
+    nearest = _evidence(surface) - _cost(surface.shape, _POINT_PRIOR)
     j, i = divmod(int(nearest.argmax()), surface.shape[1])
     di, dj = peak_offset(nearest, i, j)
     return (x0 + left + i + di, y0 + top + j + dj), float(surface[j, i]), float(surface[reach, reach])
+
+
+def _evidence(similarity: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return how much correlations say for their places: a place that leaves half as much unexplained has 0.7 more."""
+    return np.asarray(-np.log(1.0 + _NOISE - similarity), np.float32)
 
 
 def _correlation(area: Image, template: Image) -> NDArray[np.float32]:

@@ -12,8 +12,8 @@ class TrackRequest:
     """A point (x, y) [px] of one eye's image taken at `stamp_s`, on behalf of a goal.
 
     For a tracker the pixel is one of the aligned images, from a node one of the images as they were taken. `extent_px`
-    (width, height) is the size of the object there, None if unknown. `goal_id` 0 ends a request: the tracker is free
-    again to follow what lies at the fovea.
+    (width, height) is the size of the object there, None if unknown. `motion` asks for whatever moves next instead of
+    the point. `goal_id` 0 ends a request: the tracker is free again to follow what lies at the fovea.
     """
 
     goal_id: int
@@ -21,6 +21,7 @@ class TrackRequest:
     left_eye: bool
     pixel: Pixel
     extent_px: tuple[float, float] | None = None
+    motion: bool = False
 
 
 @dataclass(frozen=True)

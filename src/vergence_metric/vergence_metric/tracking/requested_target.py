@@ -13,7 +13,7 @@ from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.sighted import in_both_eyes, in_left_eye
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
 from vergence_metric.tracking.track import Track, TrackStatus
-from vergence_metric.tracking.tracked_target import Target, parallax, vergence_of
+from vergence_metric.tracking.tracked_target import Target, disparity_of_parallax, parallax, vergence_of
 
 USUAL_EXTENT_PX = (60.0, 60.0)
 _TURNED_PX = 2.0  # change of the vergence since the last match up to which the expected disparity is searched alone
@@ -29,7 +29,7 @@ def requested_target(
     parameters: TrackerParameters,
 ) -> Target:
     """Return the target of a request, as it is in the pair in which it was asked for, to be found in the next one."""
-    point = request.pixel if request.left_eye else _in_left_eye(request.pixel, pair, estimator)
+    point = request.pixel if request.left_eye else pixel_in_left_eye(request.pixel, pair, estimator)
     patch = RememberedPatch(pair.left, pair.views[0], point)
     appearance = TargetAppearance(pair.left, point, request.extent_px or USUAL_EXTENT_PX)
     target = Target(track_id, pair.stamp_s, appearance, pair.stamp_s, patch.direction, np.zeros(3), True)
@@ -42,13 +42,20 @@ def requested_target(
 def weigh_depths(
     target: Target, depths: DepthHypotheses, disparity: Disparity, left_px: Pixel, views: tuple[EyeView, EyeView]
 ) -> bool:
-    """Add what a pair says of the target's distance; returns whether it is the likeliest by now.
+    """Add what a pair says of the target's distance; returns whether it is the likeliest by now."""
+    answered = depths.update(parallax_shares(disparity, left_px, views))
+    if depths.best is not None:
+        target.parallax_rad = depths.best.parallax_rad
+    return answered is not None and answered is depths.best
+
+
+def parallax_shares(disparity: Disparity, left_px: Pixel, views: tuple[EyeView, EyeView]) -> list[tuple[float, float]]:
+    """Return the parallaxes [rad] that a pair gives a left pixel, the answer's first, and the probability of each.
 
     The answer has its confidence as probability, the estimator's other candidates share the rest by their likelihood.
     """
     if disparity.status not in (DisparityStatus.OK, DisparityStatus.AMBIGUOUS):
-        depths.update([])
-        return False
+        return []
     others = [c for c in disparity.candidates if abs(c.disparity_px - disparity.horizontal_px) > _SAME_PX]
     sure, rest = disparity.confidence, sum(c.likelihood for c in others)
     if disparity.status is DisparityStatus.AMBIGUOUS and rest > 0.0:
@@ -57,10 +64,7 @@ def weigh_depths(
     left_over = (1.0 - sure) / max(rest, 1.0 - sure, 1e-6)
     seen = [(disparity.horizontal_px, sure), *((c.disparity_px, left_over * c.likelihood) for c in others)]
     y = left_px[1] - disparity.vertical_px
-    answered = depths.update([(parallax(left_px, views, (left_px[0] - d, y)), share) for d, share in seen])
-    if depths.best is not None:
-        target.parallax_rad = depths.best.parallax_rad
-    return answered is depths.best
+    return [(parallax(left_px, views, (left_px[0] - d, y)), share) for d, share in seen]
 
 
 def track_requested(
@@ -86,14 +90,12 @@ def track_requested(
     target.appearance.accept(pair.left, sighting, renew=disparity.ok)
     target.update_direction(pair.stamp_s, views[0].direction(sighting.pixel))
     track = in_left_eye(target, sighting, disparity.reason or "another distance is likelier")
-    ranked = [(target.disparity_of(one.parallax_rad, sighting.pixel, views), one.weight) for one in depths.ranked]
+    ranked = [(disparity_of_parallax(one.parallax_rad, sighting.pixel, views), one.weight) for one in depths.ranked]
     track = replace(track, candidates=tuple((d, weight) for d, weight in ranked if d is not None))
     if likeliest:
         track = in_both_eyes(track, target, disparity, views, pair.stamp_s)
     if not depths.certain:
-        several = len(depths.ranked) > 1
-        reason = "the target may be at one of several distances" if several else "the target's distance is not certain"
-        return replace(track, status=TrackStatus.AMBIGUOUS, reason=reason)
+        return replace(track, status=TrackStatus.AMBIGUOUS, reason=depths.doubt)
     if sighting.spread_px > largest_spread_px:
         reason = f"the target's place is not certain: {sighting.spread_px:.0f} px beside it looks the same"
         return replace(track, status=TrackStatus.AMBIGUOUS, reason=reason, candidates=())
@@ -122,7 +124,10 @@ def find_by_surroundings(
     if found is None:
         return None
     alike = found.similarity >= p.request_similarity
-    if target.found and not (alike and (target.hidden or found.at_point >= p.anchor_similarity)):
+    if alike:
+        target.most_at_point = max(target.most_at_point, found.at_point)
+    itself = found.at_point >= target.most_at_point - (1.0 - p.anchor_similarity)
+    if target.found and not (alike and (target.hidden or itself)):
         return None
     if alike and target.hidden:
         target.appearance = TargetAppearance(left, found.pixel, target.appearance.extent_px)
@@ -144,7 +149,7 @@ def without_drift(
     return replace(followed, pixel=anchor.pixel, similarity=max(followed.similarity, anchor.similarity))
 
 
-def _in_left_eye(pixel: Pixel, pair: StoredPair, estimator: DisparityEstimator) -> Pixel:
+def pixel_in_left_eye(pixel: Pixel, pair: StoredPair, estimator: DisparityEstimator) -> Pixel:
     """Return where a point of the right image is in the left one; where it would be at infinity if not matched."""
     last = pair.right.shape[1] - 1
     right, left = (np.ascontiguousarray(image[:, ::-1]) for image in (pair.right, pair.left))

@@ -40,7 +40,7 @@ class Segmenter:
             right,
             point,
             (disparity.horizontal_px, disparity.vertical_px),
-            _tolerance_px(disparity.horizontal_px, views, self._baseline_m),
+            layer_tolerance_px(disparity.horizontal_px, views, self._baseline_m),
             p.region_px,
             p.snap_px,
         )
@@ -72,7 +72,7 @@ def offset_inside(fixated: Pixel, center: Pixel, extent_px: tuple[float, float] 
     return offset if inside else (0.0, 0.0)
 
 
-def _tolerance_px(disparity_px: float, views: tuple[EyeView, EyeView], baseline_m: float) -> int:
+def layer_tolerance_px(disparity_px: float, views: tuple[EyeView, EyeView], baseline_m: float) -> int:
     """Return the variation of disparity over an object about as deep as wide."""
     f = views[0].camera.fx_px
     parallax_rad = views[1].pan_rad - views[0].pan_rad + disparity_px / f

@@ -38,6 +38,7 @@ class Target:
     patch: RememberedPatch | None = None  # of a requested target
     depths: DepthHypotheses | None = None  # of a requested target
     found: bool = True  # since its request
+    most_at_point: float = 0.0  # of a requested target: what noise leaves of the point's similarity with itself
     goal_id: int = 0
     sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # recent stamps and directions
     unbounded_pairs: int = 0  # in which it might have been segmented
@@ -104,18 +105,19 @@ class Target:
         """Return the predicted disparity at a left pixel with the eyes in `views`, None if never measured."""
         if math.isnan(self.parallax_rad):
             return None
-        return self.disparity_of(self.parallax_rad, left_px, views)
+        return disparity_of_parallax(self.parallax_rad, left_px, views)
 
-    def disparity_of(self, parallax_rad: float, left_px: Pixel, views: tuple[EyeView, EyeView]) -> float | None:
-        """Return the disparity that a parallax gives at a left pixel, None if the right eye could not see it."""
-        left = views[0].direction(left_px)
-        angle = _across(left) + parallax_rad
-        # Same elevation about the baseline, rotated by the parallax.
-        forward = left * np.array([1.0, 0.0, 1.0])
-        forward /= np.linalg.norm(forward)
-        right = forward * math.cos(angle) + np.array([0.0, math.sin(angle), 0.0])
-        x = views[1].pixel(right)[0]
-        return left_px[0] - x if math.isfinite(x) else None
+
+def disparity_of_parallax(parallax_rad: float, left_px: Pixel, views: tuple[EyeView, EyeView]) -> float | None:
+    """Return the disparity that a parallax gives at a left pixel, None if the right eye could not see it."""
+    left = views[0].direction(left_px)
+    angle = _across(left) + parallax_rad
+    # Same elevation about the baseline, rotated by the parallax.
+    forward = left * np.array([1.0, 0.0, 1.0])
+    forward /= np.linalg.norm(forward)
+    right = forward * math.cos(angle) + np.array([0.0, math.sin(angle), 0.0])
+    x = views[1].pixel(right)[0]
+    return left_px[0] - x if math.isfinite(x) else None
 
 
 def parallax(left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> float:

@@ -148,7 +148,7 @@ def _region(
     if not fit.any():
         return nothing
     chosen = int(np.argmin(np.where(fit, nearest, np.inf)))
-    mask = _trimmed(_filled(labels == chosen))
+    mask = _trimmed(filled(labels == chosen))
     ys, xs = np.nonzero(mask)
     if len(xs) == 0:
         return nothing
@@ -179,7 +179,7 @@ def _trimmed(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.asarray(labels == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax()))
 
 
-def _filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the mask with its holes filled."""
     padded = cv2.copyMakeBorder(mask.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     outside = padded.copy()

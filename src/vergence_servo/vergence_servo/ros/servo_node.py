@@ -19,10 +19,6 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_nanoseconds
-from vergence_rig.regular_file import expanded
-from vergence_rig.rig import JOINT_NAMES
-from vergence_rig.rig_file import load_rig
-from vergence_servo.calibration import load_servos, servo_limits
 from vergence_servo.command_guard import (
     CommandRefusedError,
     StampGuard,
@@ -31,14 +27,12 @@ from vergence_servo.command_guard import (
     ordered_positions,
 )
 from vergence_servo.commanders import conflict
-from vergence_servo.driver_set import DriverSet, backends_of
 from vergence_servo.drivers.registry import find_backend
-from vergence_servo.guardian import Guardians
-from vergence_servo.last_pose import default_pose_file, read_pose, write_pose
 from vergence_servo.parameters import ServoNodeParameters, parameter_groups
 from vergence_servo.ros import servo_messages as convert
 from vergence_servo.servo_channel import RetryParameters, ServoChannel
-from vergence_servo.servo_head import Mode, ServoHead
+from vergence_servo.servo_hardware import ServoHardware
+from vergence_servo.servo_head import Mode
 from vergence_servo.servo_reports import CommandCounts, channel_report, commands_report, head_report
 from vergence_servo.trajectory import Trajectory, check_end, start_delay_s
 
@@ -55,36 +49,12 @@ class ServoNode(Node):
         super().__init__("servo_node", **node_options)
         self._settings = declare(self, parameter_groups())
         values: ServoNodeParameters = self._settings.value
-        servos = load_servos(values.servos)
-        rig = load_rig(values.rig)
-        backends = backends_of(servos, values.joints, values.backend)
-        limits = {
-            name: servo_limits(name, servos[name], rig.joints[name] if name in JOINT_NAMES else None)
-            for name in values.joints
-        }
-        channels = {name: limit.calibration.channel for name, limit in limits.items()}
-        self._drivers = DriverSet(
-            backends, lambda backend: dataclasses.asdict(self._settings.get(backend.parameters)), channels
+        self._hardware = ServoHardware(
+            values,
+            self._settings.get(RetryParameters),
+            lambda backend: dataclasses.asdict(self._settings.get(backend.parameters)),
         )
-        self._guardians: Guardians | None = None
-        try:
-            if values.guardian:
-                self._guardians = Guardians(self._drivers, channels, values.guardian_timeout_s)
-            self._pose_file = expanded(values.pose_file) if values.pose_file else default_pose_file()
-            self._pose = read_pose(self._pose_file)
-            self._head = ServoHead(
-                self._drivers.by_joint,
-                limits,
-                values,
-                self._pose,
-                time.monotonic(),
-                self._settings.get(RetryParameters),
-            )
-        except BaseException:
-            self._drivers.close()
-            if self._guardians is not None:
-                self._guardians.dismiss()
-            raise
+        self._head, self._drivers = self._hardware.head, self._hardware.drivers
         self._stamps = self._new_stamp_guard(values)
         self._settings.on_change(self._changed)
         self._counts = CommandCounts()
@@ -99,26 +69,22 @@ class ServoNode(Node):
                 self.get_logger().warning(backend.warning)
         if not values.enabled:
             self._head.enable(False, time.monotonic())
-        elif values.start == "last_pose" and self._pose:
+        elif values.start == "last_pose" and self._hardware.pose:
             self._head.attach_all(time.monotonic())
         elif values.start == "last_pose":
-            self.get_logger().warning(f"no last pose in {self._pose_file}: the servos start released")
+            self.get_logger().warning(f"no last pose in {self._hardware.pose_file}: the servos start released")
 
     def _connect(self, values: ServoNodeParameters) -> None:
         diagnostics = Diagnostics(self, self._drivers.description())
-        diagnostics.add("servos", lambda: head_report(self._head, self._drivers, self._guardians))
+        diagnostics.add("servos", lambda: head_report(self._head, self._drivers, self._hardware.guardians))
         diagnostics.add("commands", lambda: commands_report(self._counts, self._conflict, time.monotonic()))
         for channel in self._head.channels.values():
             diagnostics.add(channel.name, partial(self._report_channel, channel))
         watch = watch_qos(self, diagnostics)
         self._states = watch.create_publisher(JointState, "joint_states")
         latched = QoSProfile(depth=1, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
-        steps_rad = {
-            name: self._head.channels[name].limits.calibration.step_rad(driver.resolution_us)
-            for name, driver in self._drivers.by_joint.items()
-        }
         self._resolution = watch.create_publisher(JointState, "~/resolution", latched)
-        self._resolution.publish(convert.resolution(self.get_clock().now().to_msg(), steps_rad))
+        self._resolution.publish(convert.resolution(self.get_clock().now().to_msg(), self._hardware.steps_rad))
         watch.create_subscription(JointState, "joint_command", self._on_command)
         watch.create_subscription(Float64MultiArray, "~/commands", self._on_commands)
         watch.create_subscription(JointTrajectory, "joint_trajectory", self._on_trajectory)
@@ -138,12 +104,9 @@ class ServoNode(Node):
         self.create_timer(1.0, self._check_commanders, clock=steady)
 
     def _step(self) -> None:
-        now_s = time.monotonic()
-        pause_s = 0.0 if self._guardians is None else self._guardians.beat(now_s)
+        pause_s = self._hardware.step()
         if pause_s:
             self.get_logger().error(f"this node hung for {pause_s:.1f} s: its guardian has released the servos")
-            self._head.release(now_s)
-        self._head.step(now_s)
 
     @staticmethod
     def _report_channel(channel: ServoChannel) -> Report:
@@ -240,17 +203,13 @@ class ServoNode(Node):
             self._save_pose()
 
     def _save_pose(self) -> None:
-        pose = self._head.sent_rad()
-        if pose == self._pose:
-            return
         try:
-            write_pose(self._pose_file, pose)
+            self._hardware.save_pose()
         except OSError as error:
             self.get_logger().warning(f"the last pose cannot be saved: {error}", throttle_duration_sec=60.0)
-        self._pose = pose
 
     def _changed(self, settings: ParameterSet) -> None:
-        self._head.set_parameters(settings.value, settings.get(RetryParameters))
+        self._hardware.set_parameters(settings.value, settings.get(RetryParameters))
         self._stamps = self._new_stamp_guard(settings.value)
 
     @staticmethod
@@ -259,18 +218,9 @@ class ServoNode(Node):
 
     def close(self) -> None:
         """Park, release everything and free the hardware."""
-        limit_s = self._settings.value.park_time_limit_s
-        deadline_s = time.monotonic() + limit_s
-        if self._head.pulsing and limit_s > 0:
-            self._head.park(time.monotonic(), only_pulsing=True)
-            while not self._head.parked and time.monotonic() < deadline_s:
-                self._step()
-                time.sleep(0.005)
+        self._hardware.park()
         self._save_pose()
-        self._head.release(time.monotonic())
-        self._drivers.close()
-        if self._guardians is not None:
-            self._guardians.dismiss()
+        self._hardware.close()
 
 
 def main(args: list[str] | None = None) -> int:

@@ -89,4 +89,6 @@ def _box(box: TrueBox) -> BoundingBox:
         cut_top=box.cut_top,
         cut_right=box.cut_right,
         cut_bottom=box.cut_bottom,
+        point_x_px=0.5 * (box.x_min_px + box.x_max_px),
+        point_y_px=0.5 * (box.y_min_px + box.y_max_px),
     )

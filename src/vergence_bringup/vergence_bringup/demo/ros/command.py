@@ -20,6 +20,7 @@ from vergence_bringup.demo.stations import Station, stations
 from vergence_bringup.demo.visits import Runner, visit_all
 from vergence_bringup.machine import shell_hint
 from vergence_bringup.node_table import PHOTOGRAPHED
+from vergence_bringup.page_address import page_address
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup, config_dir, environment
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
@@ -53,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="run by the wall clock, whether or not this machine keeps up (default: in simulated time, which waits)",
     )
+    parser.add_argument("--no-page", action="store_true", help="without web_node, the page that shows the head at work")
     parser.add_argument("--seed", type=int, default=0, help="seed of the simulator's noise (default: 0)")
 
 
@@ -89,6 +91,9 @@ def _run(options: argparse.Namespace, rig: Rig, chosen: list[Station], photograp
     with ProcessGroup(log_dir=options.out / "log") as processes:
         for name, command in commands.items():
             processes.start(name, command)
+        if "web_node" in commands:
+            address = page_address(options.out / "log" / "web_node.log", processes.check)
+            _say(f"while the demo runs, the page of the head is at {address}")
         with _runner(options, rig, photographs, processes.check) as runner:
             visit_all(runner, chosen, results, _say)
             time_figures = runner.time_figures()
@@ -145,8 +150,14 @@ def _commands(options: argparse.Namespace, rig: Rig, photographs: Photographs | 
     world: dict[str, object] = {"seed": options.seed, "preset": "ideal" if options.ideal else "realistic"}
     simulated_time = not options.real_time
     if photographs is None:
-        return simulated_head(path, simulated_time=simulated_time, **world)
-    return simulated_head(path, PHOTOGRAPHED, simulated_time=simulated_time, **world, **photographs.parameters)
+        commands = simulated_head(path, simulated_time=simulated_time, **world)
+    else:
+        commands = simulated_head(path, PHOTOGRAPHED, simulated_time=simulated_time, **world, **photographs.parameters)
+    if not options.no_page:
+        # Any free port: another head on this machine may have the usual one.
+        page = {"rig": str(path), "use_sim_time": simulated_time, "port": 0}
+        commands["web_node"] = NodeCommand.of("web_node", page)
+    return commands
 
 
 def _described_rig(ideal: bool) -> Rig:

@@ -16,6 +16,7 @@ from vergence_metric.ros.eye_rotation_node import EyeRotationNode
 from vergence_servo.ros.servo_node import ServoNode
 from vergence_sim.ros.photo_node import PhotoNode
 from vergence_sim.ros.sim_node import SimNode
+from vergence_web.ros.web_node import WebNode
 
 KINDS: dict[str, Callable[..., Node]] = {
     "box_metric_node": BoxMetricNode,
@@ -26,6 +27,7 @@ KINDS: dict[str, Callable[..., Node]] = {
     "photo_node": PhotoNode,
     "servo_node": ServoNode,
     "sim_node": SimNode,
+    "web_node": WebNode,
 }
 
 
@@ -39,5 +41,6 @@ def parameters_without_hardware(executable: str, folder: Path) -> dict[str, Any]
         "camera_node": {"device": str(folder), "width_px": 160, "height_px": 120},
         "photo_node": {"left": str(pictures[0]), "right": str(pictures[1])},
         "servo_node": {"backend": "fake", "pose_file": str(folder / "pose.json")},
+        "web_node": {"port": 0},
     }
     return given.get(executable, {})

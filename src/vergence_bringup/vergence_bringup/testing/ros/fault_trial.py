@@ -27,7 +27,7 @@ NAMED_WITHIN_S, RECOVERED_WITHIN_S = 2.0, 5.0
 _FALSE_RAD = math.radians(1.5)
 _NEARER_RAD = math.radians(6.0)
 _AWAKE_S = 1.5  # by then the cameras' noise is known
-_SETTLED_S = 1.0  # a claim of before the fault is no claim about it
+_SETTLED_S, _SETTLED_REPORTS = 1.0, 50  # a claim of before the fault is no claim about it; both must have passed
 _LEAST_S = 1.5
 _REST_S, _REST_RAD = 0.5, math.radians(0.3)
 
@@ -67,7 +67,7 @@ class FaultTrial:
         self._statuses: dict[str, DiagnosticStatus] = {}
         self._arrived_s: dict[str, float] = {}
         self.verged = False
-        self._since_s, self._false = math.inf, 0
+        self._since_s, self._reports, self._false = math.inf, 0, 0
         self.head = FaultyHead(TexturedWall(), context=self._context)
         verge = [Parameter("start", value="verge")]
         self._nodes: list[Node] = [
@@ -103,13 +103,14 @@ class FaultTrial:
 
     def run(self, fault: Fault, timeout_s: float = 30.0) -> Outcome:
         """Inject a fault until it is named and a while longer, end it, and wait until it is no longer named."""
-        self._since_s, self._false = time.monotonic() + _SETTLED_S, 0
+        self._since_s, self._reports, self._false = time.monotonic() + _SETTLED_S, 0, 0
         fault.inject(self.head)
         if fault.wall_moves:
             self.head.wall.goal_rad += _NEARER_RAD
         began_s = time.monotonic()
         named_s = self._wait(lambda: fault.words in self._said(fault.source, began_s), timeout_s)
         said = self._said(fault.source, began_s)
+        self._wait(lambda: self._reports > _SETTLED_REPORTS, timeout_s)
         self._wait(lambda: time.monotonic() - began_s > _SETTLED_S + _LEAST_S, timeout_s)
         at_rest = self.head.joints_rad
         self._wait(lambda: time.monotonic() - began_s > _SETTLED_S + _LEAST_S + _REST_S, timeout_s)
@@ -146,5 +147,7 @@ class FaultTrial:
 
     def _on_state(self, message: GazeState) -> None:
         self.verged = message.verged
-        if message.verged and time.monotonic() > self._since_s and abs(self.head.vergence_error_rad) > _FALSE_RAD:
+        self._reports += 1
+        settled = time.monotonic() > self._since_s and self._reports > _SETTLED_REPORTS
+        if message.verged and settled and abs(self.head.vergence_error_rad) > _FALSE_RAD:
             self._false += 1

@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 
 from vergence_metric.boxes.layouts.protocol import Array, Candidates, Layout, Output, WarmUp
 
+_SCORE_TOLERANCE = 1e-3
+_IN_PIXELS = 0.5
+_MOST_NEGATIVE = 0.25  # of the sizes; a trained network without objects in view may have a few
+
 STRIDE_SETS = ((8, 16, 32), (8, 16, 32, 64), (8, 16), (4, 8, 16, 32), (16, 32))
 
 
@@ -38,9 +42,9 @@ class GridLayout(Layout):
                     return cls((index,), classes, strides)
         return None
 
-    def values_agree(self, warm_up: WarmUp) -> bool:
-        """Return whether scores are at most 1 and boxes are centres and sizes in pixels."""
-        return self._scores_are_shares(warm_up) and self._in_pixels(warm_up)
+    def contradiction(self, warm_up: WarmUp) -> str:
+        """See Layout: scores must be shares, and boxes centres and sizes in pixels."""
+        return self._scores_contradiction(warm_up) or self._pixels_contradiction(warm_up)
 
     def explains(self, output: Output, warm_up: WarmUp) -> bool:
         """Return whether an output is the map of one stride before decoding: the grid's sides stand in its shape."""
@@ -70,18 +74,52 @@ class GridLayout(Layout):
     def _first_class(cls) -> int:
         return 5 if cls.objectness else 4
 
-    def _scores_are_shares(self, warm_up: WarmUp) -> bool:
-        return bool((np.abs(self._warm_up_rows(warm_up)[:, 4:]) <= 1.0 + 1e-3).all())
+    def _scores_contradiction(self, warm_up: WarmUp) -> str:
+        scores = self._warm_up_rows(warm_up)[:, 4:]
+        low, high = float(scores.min()), float(scores.max())
+        if low < -_SCORE_TOLERANCE or high > 1.0 + _SCORE_TOLERANCE:
+            return f"its scores must be 0 to 1: got {low:.3g} to {high:.3g}"
+        return ""
 
-    def _in_pixels(self, warm_up: WarmUp) -> bool:
-        """Decoded sizes are not negative and centres go with the cells; undecoded ones are logarithms and offsets."""
-        rows = self._warm_up_rows(warm_up)
-        return float((rows[:, 2:4] < 0).mean()) < 0.05 and float(np.abs(rows[:, :2]).max(initial=0.0)) > 16.0
+    def _pixels_contradiction(self, warm_up: WarmUp) -> str:
+        negative = float((self._warm_up_rows(warm_up)[:, 2:4] < 0.0).mean())
+        if negative > _MOST_NEGATIVE:
+            return f"its widths and heights must not be negative: {negative:.0%} of them are"
+        slope = self.grid_slope(warm_up)
+        if not slope > _IN_PIXELS:
+            return f"the centres of its boxes must be in pixels: from cell to cell they change by {slope:.2g} cells"
+        return ""
+
+    def grid_slope(self, warm_up: WarmUp) -> float:
+        """Return by how many cells boxes' centres change from cell to cell: 1 if they are in pixels, 0 for offsets.
+
+        The lesser of the least-squares slopes of x over the cells' x and of y over their y, summed over the whole grid.
+        """
+        centres = np.concatenate(
+            [np.tile(cell_centres(warm_up.input_px, stride), (self.rows_per_cell, 1)) for stride in self.strides]
+        )
+        centres -= centres.mean(0)
+        spread = (centres**2).sum(0)
+        if not spread.all():
+            return math.nan
+        return float(((centres * self._warm_up_rows(warm_up)[:, :2]).sum(0) / spread).min())
 
     def _warm_up_rows(self, warm_up: WarmUp) -> Array:
         return np.asarray(self.rows(warm_up.outputs[self.outputs[0]][0]), np.float64)
 
 
+def cell_centres(input_px: tuple[int, int], stride: int) -> Array:
+    """Return the centres (N, 2) [px] of one stride's cells, row by row, of an input of (width, height)."""
+    columns, rows = math.ceil(input_px[0] / stride), math.ceil(input_px[1] / stride)
+    y, x = np.mgrid[0:rows, 0:columns]
+    return (np.column_stack([x.ravel(), y.ravel()]) + 0.5) * stride
+
+
 def cells(input_px: tuple[int, int], strides: Sequence[int]) -> int:
     """Return how many cells an input of (width, height) has over all strides."""
     return sum(math.ceil(input_px[0] / s) * math.ceil(input_px[1] / s) for s in strides)
+
+
+def objectness_is_one(rows: Array) -> bool:
+    """Return whether the objectness, column 4 of rows (N, columns), is 1 throughout."""
+    return bool((np.abs(rows[:, 4] - 1.0) < _SCORE_TOLERANCE).all())

@@ -17,11 +17,11 @@ Output = NDArray[Any]
 
 @dataclass(frozen=True)
 class WarmUp:
-    """The first run of a model, on a grey picture, from which its layout is recognised.
+    """The first run of a model, on a structured picture, from which its layout is recognised.
 
     `output_names` and `outputs` are in the model's order, `input_px` is the (width, height) it was run with,
-    `metadata` the file's own entries, and `class_count` the number of class names among them, None if there are none.
-    Shapes declared in the file are not used: exporters get them wrong.
+    `metadata` the file's own entries, and `class_count` the number of class names of the user or among them, None if
+    there are none. Shapes declared in the file are not used: exporters get them wrong.
     """
 
     output_names: Sequence[str]
@@ -36,11 +36,18 @@ class Candidates:
     """Possible objects of one image.
 
     `xyxy` (K, 4) are corners [px of the input, counted from its outer corner], `scores` (K,), `class_ids` (K,).
+    `landmarks` (K, L, 2) are points on the objects in the same pixels, None where the model gives none.
     """
 
     xyxy: Array
     scores: Array
     class_ids: NDArray[np.int64]
+    landmarks: Array | None = None
+
+    def rows(self, chosen: NDArray[Any]) -> "Candidates":
+        """Return the candidates at these indices, or where a mask (K,) is True."""
+        landmarks = None if self.landmarks is None else self.landmarks[chosen]
+        return Candidates(self.xyxy[chosen], self.scores[chosen], self.class_ids[chosen], landmarks)
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,12 @@ class Layout(ABC):
     certain: ClassVar[bool] = False
     """True if a match cannot be another layout, because the outputs' names say so."""
 
+    class_names: ClassVar[tuple[str, ...]] = ()
+    """Names of the classes of every model of this layout; empty if its models differ."""
+
+    default_threshold: ClassVar[float] = 0.35
+    """Least score of an object, where neither the parameters nor the metadata name one."""
+
     outputs: tuple[int, ...]
     classes: int | None
     strides: tuple[int, ...] = ()
@@ -72,9 +85,9 @@ class Layout(ABC):
     def matches(cls, warm_up: WarmUp) -> "Layout | None":
         """Return this layout for a model by the shapes of its outputs; None if they do not fit."""
 
-    def values_agree(self, warm_up: WarmUp) -> bool:
-        """Return whether the warm-up's values agree with this layout; asked where shapes fit several layouts."""
-        return True
+    def contradiction(self, warm_up: WarmUp) -> str:
+        """Return what in the warm-up's values, or in an output's name, this layout cannot have; "" for nothing."""
+        return ""
 
     def preprocessing(self, dtype: Any) -> Preprocessing:
         """Return how an image becomes the input (of element type `dtype`), unless the parameters override it."""
@@ -112,7 +125,9 @@ class Layout(ABC):
         found = self.decode(used, input_px, threshold)
         good = (found.scores >= threshold) & np.isfinite(found.xyxy).all(1) & np.isfinite(found.scores)
         good &= (found.xyxy[:, 2:] > found.xyxy[:, :2]).all(1)
-        return Candidates(found.xyxy[good], found.scores[good], found.class_ids[good])
+        if found.landmarks is not None:
+            good &= np.isfinite(found.landmarks).all((1, 2))
+        return found.rows(good)
 
     def check_numbers(self, outputs: Sequence[Output]) -> None:
         """Raise DetectorError where one of the outputs that `decode` needs holds NaN."""

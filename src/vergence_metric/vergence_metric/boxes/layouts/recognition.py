@@ -40,24 +40,33 @@ def find_layout(warm_up: WarmUp, wanted: str = AUTO) -> Layout:
         raise ModelLayoutError(f"the model's outputs must have the layout {wanted!r}: got {shapes}")
     width, height = warm_up.input_px
     if not fitting:
+        maps = all(output.ndim in (4, 5) for output in warm_up.outputs)
+        hint = ", maps before decoding: export it with its detection head (YOLOv7: --grid)" if maps else ""
         raise ModelLayoutError(
             f"the model's outputs must have one of the detector layouts {', '.join(layout_names())}: got {shapes} "
-            f"for an input of {width}x{height} px"
+            f"for an input of {width}x{height} px{hint}"
         )
-    agreeing = fitting if len(fitting) == 1 else [layout for layout in fitting if layout.values_agree(warm_up)]
-    if len(agreeing) != 1:
-        names = " or ".join(layout.name for layout in fitting)
+    against = {layout: layout.contradiction(warm_up) for layout in (_checked(one, warm_up) for one in fitting)}
+    agreeing = [layout for layout, reason in against.items() if not reason]
+    if len(agreeing) == 1:
+        return agreeing[0]
+    parameter = "the parameter 'detector.layout'"
+    if not agreeing:
+        reasons = "; ".join(f"to be {layout.name}, {reason}" for layout, reason in against.items())
         raise ModelLayoutError(
-            f"the model's outputs {shapes} could be {names}: say which by the parameter 'detector.layout'"
+            f"the model's outputs {shapes} must have the values of a layout, not only its shape: {reasons}. If it is "
+            f"one of these nevertheless, say which by {parameter}"
         )
-    return _checked(agreeing[0], warm_up)
+    names = " or ".join(layout.name for layout in agreeing)
+    also = "" if len({layout.classes for layout in agreeing}) == 1 else ", or name its classes by 'detector.labels'"
+    raise ModelLayoutError(f"the model's outputs {shapes} could be {names}: say which by {parameter}{also}")
 
 
 def _checked(layout: Layout, warm_up: WarmUp) -> Layout:
     try:
         layout.check_numbers([warm_up.outputs[i] for i in layout.outputs])
     except DetectorError as error:
-        raise ModelLayoutError(f"{error} (for a grey picture)") from error
+        raise ModelLayoutError(f"{error} (for a picture of test patterns)") from error
     return layout
 
 

@@ -24,14 +24,22 @@ class YoloV10(Layout):
                 return cls((index,), warm_up.class_count)
         return None
 
-    def values_agree(self, warm_up: WarmUp) -> bool:
-        """Return whether classes are whole numbers, scores fall and corners are in order."""
+    def contradiction(self, warm_up: WarmUp) -> str:
+        """See Layout: classes are whole numbers, scores are shares that fall, corners are in order."""
         rows = np.asarray(warm_up.outputs[self.outputs[0]][0], np.float64)
         scores, ids = rows[:, 4], rows[:, 5]
-        whole = bool((ids == np.rint(ids)).all() and (ids >= 0).all())
-        ordered = bool((np.diff(scores) <= 1e-6).all() and (rows[:, 2:4] >= rows[:, :2] - 1e-3).all())
+        if not ((ids == np.rint(ids)) & (ids >= 0)).all():
+            return "column 5 must be numbers of classes"
+        if warm_up.class_count is not None and (ids >= warm_up.class_count).any():
+            return f"column 5 must be numbers of its {warm_up.class_count} classes: got up to {ids.max():g}"
+        if not ((scores >= 0.0) & (scores <= 1.0 + 1e-3)).all() or (np.diff(scores) > 1e-3).any():
+            return "column 4 must be scores from 1 to 0 that fall"
         # Where this column is 1 throughout it is the objectness of YOLOv6.
-        return whole and ordered and not bool((scores == 1.0).all())
+        if len(scores) > 1 and (scores == 1.0).all():
+            return "column 4 must be scores: it is 1 throughout"
+        if not (rows[:, 2:4] >= rows[:, :2] - 1e-3).all():
+            return "its corners must be in order"
+        return ""
 
     def decode(self, outputs: Sequence[Output], input_px: tuple[int, int], threshold: float) -> Candidates:
         """Return all rows; see Layout."""

@@ -1,0 +1,82 @@
+"""The handed photographs as sequences under known homographies: a click, a saccade to it, then a sweep about it."""
+
+import math
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+
+from bench.photos_data import NoPhotographsError, pair_names, pair_of, photographs_rig, targets
+from bench.trackers_scenes import FRAME_S, REQUEST_FRAME, Frame
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.rig import Rig
+from vergence_sim.optics import Lens
+from vergence_sim.photo.views import PhotoEye
+
+__all__ = ["NoPhotographsError", "photograph_rig", "sequences"]
+
+_PAIRS_USED = 12
+_SACCADE, _REST, _SWEEP = 4, 12, 40  # pairs
+_ASIDE_RAD, _ABOVE_RAD = math.radians(7.0), math.radians(3.0)
+_SWEEP_RAD = math.radians(4.0)
+_LANDING_RAD = math.radians(0.4)  # by which the joints are not where they report, after the saccade
+_NOISE = 2.5
+_HALF_PX = 15.0  # of the square about the point that counts as it
+
+
+def photograph_rig() -> Rig:
+    """Return the rig of the sequences."""
+    return photographs_rig()
+
+
+def sequences(count: int = _PAIRS_USED) -> Iterator[tuple[str, list[Frame]]]:
+    """Yield name and frames for one point of each of `count` pairs. Raises NoPhotographsError without photographs."""
+    names = pair_names()
+    for number in range(count):
+        name = names[number * len(names) // count]
+        yield name, list(_frames(name, number))
+
+
+def _frames(name: str, seed: int) -> Iterator[Frame]:
+    rig, rng = photographs_rig(), np.random.default_rng(seed)
+    pair, point = pair_of(name), targets(name, 3)[1].point
+    focal_px = Lens(rig.left_camera).render_focal_px
+    *photographs, matrix = pair.seen_at(focal_px)
+    eyes = [
+        PhotoEye(photograph, matrix, Lens(camera), np.eye(3))
+        for photograph, camera in zip(photographs, (rig.left_camera, rig.right_camera), strict=True)
+    ]
+    rays = pair.rays(point)
+    on = pair.fixation(point)
+    side = 1.0 if point.x_px > 0.5 * pair.width_px else -1.0  # the eyes come from the middle of the picture
+    for number in range(REQUEST_FRAME + 1 + _SACCADE + _REST + _SWEEP):
+        landed = min(max(number - REQUEST_FRAME, 0) / _SACCADE, 1.0)
+        swept = max(number - REQUEST_FRAME - _SACCADE - _REST, 0) / _SWEEP
+        aside = (1.0 - landed) * side * _ASIDE_RAD - side * _SWEEP_RAD * math.sin(2 * math.pi * swept)
+        true = EyeAngles(
+            on.pan_left_rad + aside, on.pan_right_rad + aside, on.tilt_rad + (1.0 - landed) * _ABOVE_RAD * side
+        )
+        off = landed * _LANDING_RAD
+        reported = EyeAngles(true.pan_left_rad + off, true.pan_right_rad + off, true.tilt_rad - off)
+        images, places = [], []
+        for eye, pan_rad, ray in zip(eyes, (true.pan_left_rad, true.pan_right_rad), rays, strict=True):
+            grey = cv2.cvtColor(eye.view(pan_rad, true.tilt_rad), cv2.COLOR_BGR2GRAY).astype(np.float32)
+            noisy = grey + _NOISE * rng.standard_normal(grey.shape, np.float32)
+            images.append(np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
+            places.append(eye.project(ray, pan_rad, true.tilt_rad))
+        x, y = places[0]
+        square = np.array([(x + i * _HALF_PX, y + j * _HALF_PX) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+        yield Frame(
+            number * FRAME_S,
+            images[0],
+            images[1],
+            (images[0], images[1]),
+            reported,
+            places[0],
+            places[1],
+            np.zeros(3),
+            square,
+            not 0.0 < landed < 1.0,
+            False,
+            true,
+        )

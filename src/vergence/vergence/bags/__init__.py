@@ -1,0 +1,1 @@
+"""Recordings: bags in rosbag2's layout on MCAP, written and read without ROS."""

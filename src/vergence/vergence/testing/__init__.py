@@ -1,0 +1,1 @@
+"""A head for tests, without simulator and hardware."""

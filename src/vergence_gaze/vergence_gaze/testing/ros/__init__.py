@@ -1,0 +1,1 @@
+"""Test doubles of nodes beside the gaze controller."""

@@ -1,0 +1,87 @@
+"""A requested point through a saccade and behind an occluder: every tracker that follows things at rest."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from vergence_metric.testing.rendered_boards import Stage, gaze, true_pixel
+from vergence_metric.tracking.registry import tracker_names
+from vergence_metric.tracking.request import TrackRequest
+from vergence_metric.tracking.track import TrackStatus
+from vergence_rig.geometry import EyeAngles
+
+PLACE = np.array([0.7, 0.08, 0.03])
+AHEAD = EyeAngles(0.0, 0.0, 0.0)
+KINDS = [kind for kind in tracker_names() if kind != "moving_target"]
+TOLERANCE_PX = {"zero_disparity": 8.0}  # a centroid, of whatever lies at the disparity
+
+
+@pytest.fixture(params=KINDS)
+def stage(request):
+    cv2.setRNGSeed(1)
+    return Stage(request.param)
+
+
+def ask(stage, eyes, left_eye=True, goal_id=5):
+    pixel = true_pixel(PLACE, left_eye, eyes)
+    request = TrackRequest(goal_id, stage.pair.stamp_s, left_eye, (float(pixel[0]), float(pixel[1])))
+    stage.tracker.request(request, stage.pair)
+
+
+def tolerance_px(stage):
+    return TOLERANCE_PX.get(stage.kind, 1.5)
+
+
+@pytest.mark.parametrize("wrong_deg", [(0.0, 0.0), (0.8, -0.7)])
+def test_it_is_carried_through_a_saccade_whose_joints_are_reported_wrong(stage, wrong_deg):
+    if stage.kind == "zero_disparity" and wrong_deg != (0.0, 0.0):
+        pytest.skip("without an appearance it follows what the joints bring to the place")
+    stage.show(PLACE, AHEAD)
+    ask(stage, AHEAD)
+    landed = gaze(PLACE)
+    off = np.radians(wrong_deg)
+    really = EyeAngles(landed.pan_left_rad + off[0], landed.pan_right_rad + off[0], landed.tilt_rad + off[1])
+    for _ in range(4):
+        track = stage.show(PLACE, really, joints=landed)
+    assert (track.status, track.goal_id) == (TrackStatus.OK, 5), track.reason
+    assert np.abs(stage.errors[-1][:2]).max() < tolerance_px(stage)
+    assert abs(stage.errors[-1][2]) < 0.5
+
+
+def test_a_point_of_the_right_image_is_the_same_point(stage):
+    stage.show(PLACE, AHEAD)
+    ask(stage, AHEAD, left_eye=False)
+    stage.show(PLACE, AHEAD)
+    assert np.abs(stage.errors[-1][:2]).max() < tolerance_px(stage)
+
+
+def test_what_covers_it_is_not_followed_and_it_is_found_again(stage):
+    stage.show(PLACE, gaze(PLACE))
+    ask(stage, gaze(PLACE))
+    before = PLACE * 0.75
+    for k in range(50):
+        track = stage.show(PLACE, gaze(PLACE), occluder_m=before + np.array([0.0, 0.2 - 0.01 * k, 0.0]))
+        assert track.goal_id == 5
+        if track.status in (TrackStatus.OK, TrackStatus.OCCLUDED):
+            assert np.abs(stage.errors[-1][:2]).max() < max(tolerance_px(stage), 6.0), k
+    assert any(one.status is TrackStatus.LOST for one in stage.tracks)
+    assert track.status is TrackStatus.OK, track.reason
+    for one in stage.tracks[1:]:
+        assert (one.status is TrackStatus.LOST) == math.isnan(one.left_px[0])
+        assert one.status is TrackStatus.OK or one.reason
+
+
+def test_a_new_request_replaces_the_old_one(stage):
+    stage.show(PLACE, gaze(PLACE))
+    ask(stage, gaze(PLACE))
+    first = stage.show(PLACE, gaze(PLACE))
+    ask(stage, gaze(PLACE), goal_id=6)
+    second = stage.show(PLACE, gaze(PLACE))
+    assert (first.goal_id, second.goal_id) == (5, 6)
+    assert second.track_id > first.track_id
+    stage.tracker.lock_here()
+    for _ in range(8):
+        free = stage.show(PLACE, gaze(PLACE))
+    assert (free.status, free.goal_id) == (TrackStatus.OK, 0), free.reason

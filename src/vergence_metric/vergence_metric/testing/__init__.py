@@ -1,0 +1,1 @@
+"""Test doubles: detectors and scenes with known answers, for tests and benchmarks."""

@@ -1,0 +1,159 @@
+"""What every tracker shares: which target it follows. A requested one, else what lies at the fovea after a saccade.
+
+When the eyes come to rest after a saccade, the tracker locks on what lies at the left fovea. A request names the point
+to follow instead, and until the next request nothing else is tracked. How a target is learnt and found again is the
+subclasses' part.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Iterable
+from typing import Generic, TypeVar
+
+from vergence_metric.disparity.protocol import Image
+from vergence_metric.pairs.frame_motion import frame_motion_px
+from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
+from vergence_metric.tracking.parameters import TrackerParameters
+from vergence_metric.tracking.request import StoredPair, TrackRequest
+from vergence_metric.tracking.saccade_detector import EyeMotion, SaccadeDetector, StampedEyeAngles
+from vergence_metric.tracking.track import Track, TrackStatus
+from vergence_rig.camera import CameraModel
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.kinematics import Kinematics
+
+_KEPT_SHARE = 0.9  # of a saccade: the largest distance from the fovea at which the target was not left
+
+TargetT = TypeVar("TargetT")
+
+
+class LockingTracker(ABC, Generic[TargetT]):
+    """Follows one target; `update` must be called with every pair, in order of their stamps.
+
+    Subclasses implement `_requested_target`, `_lock` and `_follow`, and set `_target` to None with `_lost_s` when they
+    give a target up.
+    """
+
+    def __init__(self, parameters: TrackerParameters, camera: CameraModel, kinematics: Kinematics) -> None:
+        self._parameters = parameters
+        self._camera, self._pitch_rad = camera, kinematics.pitch_rad
+        self._track_id = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Drop the target and the eyes' motion; the next lock has a new id."""
+        self._saccades = SaccadeDetector(self._parameters)
+        self._target: TargetT | None = None
+        self._requested = False
+        self._wants_lock = True
+        self._stamp_s = self._lost_s = -math.inf
+        self._before: Image | None = None
+        # Recent distances of the target from the fovea, up to the start of the current saccade: (stamp, px).
+        self._distances: deque[tuple[float, float]] = deque()
+
+    def request(self, request: TrackRequest, pair: StoredPair) -> None:
+        """Follow a point of a stored pair from now on, on behalf of the request's goal."""
+        self._track_id += 1
+        self._wants_lock, self._requested = False, True
+        self._target = self._requested_target(request, pair)
+
+    def lock_here(self) -> None:
+        """Lock again on the object at the fovea as soon as the eyes are at rest, as after a saccade."""
+        self._target, self._requested, self._wants_lock = None, False, True
+
+    def update(
+        self, left: Image, right: Image, stamp_s: float, eyes: EyeAngles, samples: Iterable[StampedEyeAngles] = ()
+    ) -> Track:
+        """Return the track in a pair. The left image is kept until the next call and must not be changed.
+
+        Args:
+            left: (h, w) grey image of the left eye.
+            right: (h, w) grey image of the right eye, aligned.
+            stamp_s: of the left image; one that is not later than the last resets the tracker.
+            eyes: joint angles, of the left eye and the tilt at the left stamp, of the right eye at the right stamp.
+            samples: joint angles since the pair before, in order of their stamps [s].
+
+        """
+        if stamp_s <= self._stamp_s:
+            self.reset()
+        motion = self._saccades.update(stamp_s, eyes, samples)
+        left_view, right_view = (
+            EyeView(self._camera, pan_rad, eyes.tilt_rad, self._pitch_rad)
+            for pan_rad in (eyes.pan_left_rad, eyes.pan_right_rad)
+        )
+        pair = StoredPair(stamp_s, left, right, (left_view, right_view))
+        before, self._before, self._stamp_s = self._before, left, stamp_s
+        if self._target is not None and self._requested:
+            return self._follow(self._target, pair, motion)
+        self._wants_lock |= motion.jumped
+        if self._target is not None:
+            track = self._follow(self._target, pair, motion)
+            self._wants_lock &= not self._is_kept(track, left, stamp_s)
+            if not self._wants_lock:
+                return track
+        if not self._wants_lock:
+            # Another target may have replaced the lost one, and eyes that are held still make no saccade.
+            self._wants_lock = min(motion.rested_s, stamp_s - self._lost_s) >= self._parameters.relock_s
+            return self._untracked(TrackStatus.LOST, "target lost: hidden too long; locks again once the eyes rest")
+        if motion.saccading:
+            return self._untracked(TrackStatus.LOCKING, "not locked yet: an eye is in a saccade")
+        if not self._is_at_rest(motion, before, left):
+            return self._untracked(TrackStatus.LOCKING, "not locked yet: the eyes have only just come to rest")
+        self._target, self._requested = None, False
+        return self._lock(pair)
+
+    @abstractmethod
+    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> TargetT:
+        """Return the target of a request, as it is in the pair in which it was asked for; the track's id is new."""
+
+    @abstractmethod
+    def _lock(self, pair: StoredPair) -> Track:
+        """Lock on what lies at the fovea: set `_target`, call `_locked`; or return why there is nothing to lock on."""
+
+    @abstractmethod
+    def _follow(self, target: TargetT, pair: StoredPair, motion: EyeMotion) -> Track:
+        """Return the track of the target in the next pair."""
+
+    def _locked(self) -> int:
+        """Count a new lock; returns its id."""
+        self._track_id += 1
+        self._wants_lock = False
+        self._distances.clear()
+        return self._track_id
+
+    def _untracked(self, status: TrackStatus, reason: str) -> Track:
+        return Track.nowhere(self._track_id, status, reason)
+
+    def _is_kept(self, track: Track, left: Image, stamp_s: float) -> bool:
+        """Return whether the eyes turned towards the target, or with it, rather than away to something else."""
+        if track.status not in (TrackStatus.OK, TrackStatus.OCCLUDED):
+            return False
+        p = self._parameters
+        away_px = distance(track.left_px, fovea_of(left))
+        saccade_px = self._camera.fx_px * math.tan(p.saccade_rad)
+        if not self._wants_lock:
+            self._distances.append((stamp_s, away_px))
+            while self._distances[0][0] < stamp_s - p.saccade_s:
+                self._distances.popleft()
+        before_px = self._distances[0][1] if self._distances else 0.0
+        # Eyes that jumped in depth turned to something else on the same ray.
+        if not abs(track.disparity_px) < _KEPT_SHARE * saccade_px:
+            return False
+        return away_px < max(_KEPT_SHARE * saccade_px, before_px + 0.5 * saccade_px)
+
+    def _is_at_rest(self, motion: EyeMotion, before: Image | None, left: Image) -> bool:
+        """Return whether the left eye rests: its joints, and its image unless that has moved for too long already."""
+        p = self._parameters
+        if motion.rested_s < p.settle_s or before is None or before.shape != left.shape:
+            return False
+        return motion.rested_s >= p.still_wait_s or frame_motion_px(before, left) <= p.still_px
+
+
+def fovea_of(image: Image) -> Pixel:
+    """Return the pixel of an ideal image's fovea, its middle."""
+    return (image.shape[1] - 1) / 2, (image.shape[0] - 1) / 2
+
+
+def is_inside(pixel: Pixel, image: Image) -> bool:
+    """Return whether a pixel lies in an image; False for NaN."""
+    return bool(0.0 <= pixel[0] <= image.shape[1] - 1 and 0.0 <= pixel[1] <= image.shape[0] - 1)
