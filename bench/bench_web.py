@@ -27,13 +27,13 @@ from bench.budget_run import cameras
 from bench.photos_data import NoPhotographsError
 from bench.process_cost import cpu_s
 from bench.results import OUT_DIR, Row
+from vergence_bringup.page_address import page_address
 from vergence_bringup.ros.processes import NodeCommand, ProcessGroup
 from vergence_common.domains import own_domain
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import to_nanoseconds
 from vergence_web.testing.chromium import BrowserError, Tab, chromium, find_chromium
 
-PORT = 18473
 SETTLED_S, MEASURED_S = 8.0, 20.0
 CLICKS = 12
 _CLICK_EVERY_S = 0.7
@@ -58,12 +58,15 @@ def run(say: Callable[[str], None]) -> list[Row]:
             nodes.start("servo_node", NodeCommand.of("servo_node", {"backend": "fake"}))
             for name in ("edge_metric_node", "gaze_controller_node"):
                 nodes.start(name, NodeCommand.of(name))
-            nodes.start("web_node", NodeCommand.of("web_node", {"port": PORT}))
+            nodes.start("web_node", NodeCommand.of("web_node", {"port": 0}))
+            url = page_address(OUT_DIR / "web_logs" / "web_node.log", nodes.check)
             with _bare_subscriber(domain) as arrivals:
-                return _measured(say, nodes, browser, arrivals)
+                return _measured(say, nodes, browser, url, arrivals)
 
 
-def _measured(say: Callable[[str], None], nodes: ProcessGroup, browser: str, arrivals: dict[int, float]) -> list[Row]:
+def _measured(
+    say: Callable[[str], None], nodes: ProcessGroup, browser: str, url: str, arrivals: dict[int, float]
+) -> list[Row]:
     end_s = time.monotonic() + _STARTED_S
     while not arrivals:
         nodes.check()
@@ -75,7 +78,7 @@ def _measured(say: Callable[[str], None], nodes: ProcessGroup, browser: str, arr
     say("no viewer")
     idle = _share(pid)
     say("one viewer")
-    viewer, drawn, clicks_ms = asyncio.run(_viewed(nodes, pid, browser))
+    viewer, drawn, clicks_ms = asyncio.run(_viewed(nodes, pid, browser, url))
     both = [(seconds, arrivals[stamp]) for stamp, seconds in drawn if stamp in arrivals]
     say(f"{len(drawn)} images drawn, {len(both)} of them received by the bare subscriber; {len(clicks_ms)} clicks")
     peer = "arrival of the same images at a bare subscriber"
@@ -99,11 +102,13 @@ def _share(pid: int) -> float:
     return (cpu_s(pid) - before) / (time.monotonic() - began)
 
 
-async def _viewed(nodes: ProcessGroup, pid: int, browser: str) -> tuple[float, list[tuple[int, float]], list[float]]:
+async def _viewed(
+    nodes: ProcessGroup, pid: int, browser: str, url: str
+) -> tuple[float, list[tuple[int, float]], list[float]]:
     """Return web_node's share of a core, (stamp [ns], latency [s]) of drawn images, and times of clicks [ms]."""
     async with chromium(browser) as running:
         tab = await running.tab(1280, 800)
-        await tab.open(f"http://127.0.0.1:{PORT}/")
+        await tab.open(url)
         await tab.wait_for("window.vergence && vergence.images.left > 5 && vergence.samples > 5", _STARTED_S)
         await asyncio.sleep(SETTLED_S)
         await tab.value("vergence.latencies = []")
@@ -111,7 +116,8 @@ async def _viewed(nodes: ProcessGroup, pid: int, browser: str) -> tuple[float, l
         await asyncio.sleep(MEASURED_S)
         share = (cpu_s(pid) - before) / (time.monotonic() - began)
         nodes.check()
-        drawn = [(int(one["stamp"]), float(one["seconds"])) for one in await tab.value("vergence.latencies")]
+        left = "vergence.latencies.filter((one) => one.eye === 'left')"
+        drawn = [(int(one["stamp"]), float(one["seconds"])) for one in await tab.value(left)]
         return share, drawn, [await _click(tab, number) for number in range(CLICKS)]
 
 

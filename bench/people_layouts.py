@@ -32,7 +32,7 @@ _NEAR_PX = 1.0
 
 def rows(say: Callable[[str], None]) -> list[Row]:
     """Build, load and detect."""
-    told, right, refused = 0, 0, []
+    recognised, right, refused = 0, 0, []
     image = np.zeros((_SIZE_PX[1], _SIZE_PX[0], 3), np.uint8)
     image[(*_CELL, 2)] = 255
     expected = np.array([_CELL[1].start, _CELL[0].start, _CELL[1].stop, _CELL[0].stop]) - 0.5
@@ -45,13 +45,13 @@ def rows(say: Callable[[str], None]) -> list[Row]:
                 except DetectorError as error:
                     refused.append(f"{family}, {classes} classes: {error}")
                     continue
-                told += 1
+                recognised += 1
                 boxes = found.xyxy_px
                 right += len(boxes) == 1 and bool(np.abs(boxes[0] - expected).max() < _NEAR_PX)
     for line in refused:
         say(f"refused: {line}")
     total = len(FAMILIES) * len(CLASS_COUNTS)
-    say(f"{told} of {total} exports are recognised, {right} read right, {len(refused)} refused")
+    say(f"{recognised} of {total} exports are recognised, {right} read right, {len(refused)} refused")
     return [
         Row("people.layout_told", right / total, f"share of {total} exports recognised and read right"),
         Row("people.layout_refused", len(refused) / total, "share refused with what to say"),

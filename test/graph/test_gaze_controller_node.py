@@ -21,7 +21,7 @@ from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
 from vergence_gaze.testing.fake_head import FakeHead
 from vergence_gaze.testing.ros.head_node import FOCAL_PX, HeadNode
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import DetectorClasses, GazeState
+from vergence_msgs.msg import DetectorClasses, GazeGoal, GazeState
 from vergence_rig.rig import JOINT_NAMES, default_rig
 
 pytestmark = pytest.mark.graph
@@ -41,6 +41,8 @@ class Scene:
         self.node: GazeControllerNode = graph.start(GazeControllerNode, use_sim_time=True)
         self.states: list[GazeState] = []
         self.client.create_subscription(GazeState, "gaze/state", self.states.append, 10)
+        self.goals: list[GazeGoal] = []
+        self.client.create_subscription(GazeGoal, "gaze/goal", self.goals.append, 10)
         self.look_at = ActionClient(self.client, LookAt, "gaze/look_at")
         self.until(lambda: bool(self.states) and math.isfinite(self.states[-1].tilt_rad), "the joints are known")
         self.until(self.look_at.server_is_ready, "the action server is there")
@@ -66,6 +68,14 @@ class Scene:
     def result(self, handle: Any) -> LookAt.Result:
         """Wait for a goal's result."""
         return self._graph.wait(handle.get_result_async()).result
+
+    def rejection(self, goal: LookAt.Goal) -> GazeGoal:
+        """Send a goal that is rejected, and return what gaze/goal says of it."""
+        before = len(self.goals)
+        assert not self.send(goal).accepted
+        self.until(lambda: len(self.goals) > before, "gaze/goal says why")
+        assert self.goals[-1].state == GazeGoal.REJECTED
+        return self.goals[-1]
 
     def cancel(self, handle: Any) -> None:
         """Ask for a goal to be cancelled."""
@@ -113,6 +123,20 @@ def test_a_click_ends_verged_and_is_held(scene: Scene) -> None:
     assert scene.states[-1].distance_m == pytest.approx(0.61, rel=0.2)
 
 
+def test_a_goal_is_published_when_it_starts_and_when_it_ends(scene: Scene) -> None:
+    goal = scene.pixel_goal()
+    handle = scene.send(goal)
+    result = scene.result(handle)
+    scene.until(lambda: len(scene.goals) >= 2, "gaze/goal has both")
+    started, ended = scene.goals[:2]
+    assert (started.state, ended.state) == (GazeGoal.ACTIVE, GazeGoal.ENDED)
+    for one in (started, ended):
+        assert bytes(one.uuid) == bytes(handle.goal_id.uuid)
+        assert (one.kind, one.left_x_px, one.image_stamp) == (goal.kind, goal.left_x_px, goal.header.stamp)
+        assert one.request.startswith("pixel (")
+    assert (ended.result, ended.reason, ended.time_s) == (result.result, result.reason, result.time_s)
+
+
 def test_a_new_goal_preempts_the_old(scene: Scene) -> None:
     first = scene.send(NOTHING_LIKE_IT)
     second = scene.send(scene.pixel_goal())
@@ -131,7 +155,7 @@ def test_cancel_stop_and_disable_hold_the_eyes(scene: Scene) -> None:
     assert scene.call(SetBool, "enable", SetBool.Request(data=False)).success
     scene.pass_cycles(3)  # what was sent before has arrived then
     sent = len(scene.head_node.commands)
-    result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.ANGLES, vergence_rad=0.1)))
+    result = scene.rejection(LookAt.Goal(kind=LookAt.Goal.ANGLES, vergence_rad=0.1))
     assert (result.result, "disabled" in result.reason) == (LookAt.Result.INVALID, True)
     scene.pass_cycles(3)
     assert len(scene.head_node.commands) == sent
@@ -140,20 +164,21 @@ def test_cancel_stop_and_disable_hold_the_eyes(scene: Scene) -> None:
 def test_goals_that_cannot_be_say_why(scene: Scene) -> None:
     behind = LookAt.Goal(kind=LookAt.Goal.POINT)
     behind.point.x, behind.point.y = -1.0, 0.2
-    result = scene.result(scene.send(behind))
+    result = scene.rejection(behind)
     assert result.result == LookAt.Result.UNREACHABLE
     assert "must be" in result.reason
     elsewhere = LookAt.Goal(kind=LookAt.Goal.POINT)
     elsewhere.header.frame_id = "moon"
-    result = scene.result(scene.send(elsewhere))
+    assert result.request == "point (-1.000, 0.200, 0.000) m in rig_base"
+    result = scene.rejection(elsewhere)
     assert result.result == LookAt.Result.INVALID
     assert "moon" in result.reason
-    assert scene.result(scene.send(LookAt.Goal(kind=99))).result == LookAt.Result.INVALID
+    assert scene.rejection(LookAt.Goal(kind=99)).result == LookAt.Result.INVALID
 
 
 @pytest.mark.parametrize("limit_s", [600.5, 1e9, -1.0, math.inf, math.nan])
 def test_a_time_limit_without_bounds_is_refused(scene: Scene, limit_s: float) -> None:
-    result = scene.result(scene.send(scene.pixel_goal(time_limit_s=limit_s)))
+    result = scene.rejection(scene.pixel_goal(time_limit_s=limit_s))
     assert result.result == LookAt.Result.INVALID
     assert result.reason == f"time_limit_s must be 0 (default) to 600 [s]: got {limit_s!r}"
 
@@ -163,10 +188,10 @@ def test_a_class_that_the_detector_does_not_look_for_is_refused_at_once(scene: S
     detector = scene.client.create_publisher(DetectorClasses, "vergence/detector_classes", latched)
     detector.publish(DetectorClasses(names=["ball", "cube", "cup"]))
     scene.until(lambda: scene.node._look_at.classes is not None, "the classes are known")
-    result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cub", time_limit_s=ENDLESS_S)))
+    result = scene.rejection(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cub", time_limit_s=ENDLESS_S))
     assert result.result == LookAt.Result.INVALID
     assert result.reason == "class_name must be one that the detector looks for (cube, ball, cup): got 'cub'"
-    result = scene.result(scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="face", time_limit_s=ENDLESS_S)))
+    result = scene.rejection(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="face", time_limit_s=ENDLESS_S))
     assert result.result == LookAt.Result.INVALID
     assert "got 'face'; faces need YuNet: the file face_detection_yunet_2023mar.onnx" in result.reason
     handle = scene.send(LookAt.Goal(kind=LookAt.Goal.CLASS, class_name="cube", time_limit_s=ENDLESS_S))

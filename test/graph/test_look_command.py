@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 
 from vergence_msgs.action import LookAt
+from vergence_msgs.msg import GazeGoal
 
 from .conftest import Graph
 
@@ -88,6 +90,22 @@ def test_a_point_in_a_frame_and_a_namespace(graph: Graph) -> None:
     (goal,) = controller.goals
     assert (goal.kind, goal.point.x, goal.point.y) == (LookAt.Goal.POINT, 0.6, 0.1)
     assert (goal.header.frame_id, goal.time_limit_s) == ("left_camera_optical_frame", 4.0)
+
+
+def test_a_rejected_goal_says_why(graph: Graph) -> None:
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    reports = graph.client.create_publisher(GazeGoal, "gaze/goal", latched)
+
+    def reject(goal: LookAt.Goal) -> GoalResponse:
+        reports.publish(GazeGoal(state=GazeGoal.REJECTED, kind=goal.kind, result=1, reason="of another goal"))
+        report = GazeGoal(state=GazeGoal.REJECTED, kind=goal.kind, point=goal.point, result=1, reason="too far left")
+        reports.publish(report)
+        return GoalResponse.REJECT
+
+    ActionServer(graph.client, LookAt, "gaze/look_at", lambda handle: LookAt.Result(), goal_callback=reject)
+    code, out, err = ended(graph, look("--point", "0.1", "3", "0"))
+    assert (code, err) == (1, "")
+    assert out.splitlines()[-1] == "UNREACHABLE: too far left"
 
 
 def test_ctrl_c_cancels_the_goal(graph: Graph) -> None:

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 from aiohttp import ClientSession, ClientWebSocketResponse, WSMsgType
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import CompressedImage, Image, JointState
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -19,7 +21,7 @@ from vergence_common.images import array_to_compressed, array_to_image
 from vergence_common.qos import IMAGE_QOS
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import GazeState
+from vergence_msgs.msg import GazeGoal, GazeState
 from vergence_web.ros.web_node import WebNode
 from vergence_web.update import HEADER
 
@@ -119,6 +121,14 @@ def test_nothing_is_received_without_a_page(graph: Graph, web: WebNode) -> None:
     again.close()
 
 
+def test_a_page_that_comes_before_the_node_is_spun_is_served_too(graph: Graph) -> None:
+    node = WebNode(context=graph.context, parameter_overrides=[Parameter("port", value=0)])
+    page = Page(graph, node)
+    graph.add(node)
+    graph.wait_until(lambda: "/gaze/state" in subscribed(node), "a subscription of gaze/state")
+    page.close()
+
+
 def test_the_state_of_the_graph_is_shown(graph: Graph, page: Page) -> None:
     states = graph.client.create_publisher(GazeState, "gaze/state", 10)
     joints = graph.client.create_publisher(JointState, "joint_states", 10)
@@ -202,10 +212,16 @@ class Controller:
     def __init__(self, graph: Graph) -> None:
         self.goals: list[LookAt.Goal] = []
         self.called: list[str] = []
+        self.accepts = True
         self.result = LookAt.Result(result=LookAt.Result.VERGED, time_s=1.25)
         node = graph.client
         self._server = ActionServer(
-            node, LookAt, "gaze/look_at", self._execute, cancel_callback=lambda handle: CancelResponse.ACCEPT
+            node,
+            LookAt,
+            "gaze/look_at",
+            self._execute,
+            goal_callback=lambda goal: GoalResponse.ACCEPT if self.accepts else GoalResponse.REJECT,
+            cancel_callback=lambda handle: CancelResponse.ACCEPT,
         )
         node.create_service(Trigger, "gaze_controller_node/stop", self._on_stop)
         node.create_service(SetBool, "gaze_controller_node/enable", self._on_enable)
@@ -256,6 +272,19 @@ def test_a_goal_that_fails_says_why(page: Page, controller: Controller) -> None:
     answer = page.ask(do="class", name="cube")
     assert (answer["ok"], answer["text"]) == (False, "LOST after 5.00 s: gone")
     assert controller.goals[0].class_name == "cube"
+
+
+def test_a_goal_that_is_rejected_says_why_and_nothing_stays_subscribed(
+    graph: Graph, web: WebNode, page: Page, controller: Controller
+) -> None:
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    graph.client.create_publisher(GazeGoal, "gaze/goal", latched).publish(
+        GazeGoal(state=GazeGoal.REJECTED, result=LookAt.Result.INVALID, reason="disabled")
+    )
+    controller.accepts = False
+    answer = page.ask(do="class", name="cube")
+    assert (answer["ok"], answer["text"]) == (False, "INVALID: disabled")
+    graph.wait_until(lambda: "/gaze/goal" not in subscribed(web), "no subscription of gaze/goal")
 
 
 @pytest.mark.parametrize(

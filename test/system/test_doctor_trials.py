@@ -125,7 +125,7 @@ def test_a_missing_detector_of_faces_is_named(tmp_path: Path) -> None:
         assert "SHA-256 8f2383e4dd3cfbb4" in finding.remedy
 
 
-def test_a_detector_of_faces_is_told_by_its_class_and_the_zoo_s_by_its_sum(
+def test_a_detector_of_faces_is_known_by_its_class_and_the_zoo_s_file_by_its_sum(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("onnx", reason="the onnx package is not installed: pip install onnx")

@@ -118,7 +118,7 @@ class Vision:
 
     def request_pixel(self, request: PixelRequest) -> None:
         """Let the tracker follow a point of a picture as it was taken."""
-        if self.images is not None and request.goal_id:
+        if self.images is not None and request.goal_id and not request.motion:
             x_px, y_px = self.images[0 if request.left_eye else 1].to_ideal([request.pixel])[0]
             request = replace(request, pixel=(float(x_px), float(y_px)))
         self._measurement.request_track(request)
@@ -127,7 +127,7 @@ class Vision:
         """Let the tracker follow what the controller asks for."""
         images = self.images
         pixel, extent_px = (math.nan, math.nan), None
-        if request.goal_id and images is not None:
+        if request.goal_id and not request.motion and images is not None:
             x_px, y_px = images[0 if request.left_eye else 1].ideal.distort([request.xy])[0]
             pixel = float(x_px), float(y_px)
             width_rad, height_rad = request.extent_rad
@@ -135,7 +135,7 @@ class Vision:
                 focal_px = images[0].fx_px
                 extent_px = focal_px * width_rad, focal_px * height_rad
         self._measurement.request_track(
-            PixelRequest(request.goal_id, request.stamp_s, request.left_eye, pixel, extent_px)
+            PixelRequest(request.goal_id, request.stamp_s, request.left_eye, pixel, extent_px, request.motion)
         )
 
     def observe(self, now_ns: int) -> list[Observation]:

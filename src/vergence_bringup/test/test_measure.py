@@ -121,6 +121,7 @@ def test_a_model_adds_metric_ii_both_ways_with_null_for_a_cut_side(pair, models,
     assert box["center_px"] == [None, 1.75]
     assert box["scores"] == [0.9, 0.8]
     assert box["right_xyxy_px"] == [28.0, 48.0, 128.0, 148.5]
+    assert box["left_point_px"] == [90.0, 100.0]
     assert figures["windows_px"]
     picture = cv2.imread(str(tmp_path / "boxes.png"))
     assert picture is not None
@@ -167,7 +168,7 @@ def red_cell(folder, x):
     return str(path)
 
 
-def test_layout_and_labels_of_a_model_that_does_not_tell_them(tmp_path, capsys):
+def test_layout_and_labels_of_a_model_that_names_neither(tmp_path, capsys):
     pair, model = (red_cell(tmp_path, 48), red_cell(tmp_path, 32)), built(tmp_path, "yolov8_rows")
     command = ["measure", *pair, "--windows", "50", "--json", "--model", model]
     assert main(command) == 2
@@ -178,6 +179,16 @@ def test_layout_and_labels_of_a_model_that_does_not_tell_them(tmp_path, capsys):
     (tmp_path / "names.txt").write_text("tomato\nleaf\n")
     assert main([*command, "--labels", str(tmp_path / "names.txt")]) == 0
     assert json.loads(capsys.readouterr().out)["box"]["class"] == "tomato"
+
+
+def test_the_point_of_a_face_is_between_its_eyes(tmp_path, capsys):
+    pair, model = (red_cell(tmp_path, 48), red_cell(tmp_path, 32)), built(tmp_path, "yunet")
+    assert main(["measure", *pair, "--windows", "50", "--json", "--model", model]) == 0
+    box = json.loads(capsys.readouterr().out)["box"]
+    assert box["class"] == "face"
+    # The built faces have their eyes a fifth of a cell below the cell's top.
+    assert box["left_point_px"] == pytest.approx([55.5, 18.7], abs=1e-3)
+    assert box["right_point_px"] == pytest.approx([39.5, 18.7], abs=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import re
 from sensor_msgs.msg import JointState
 
 from vergence_bringup.figures.watch_screen import Screen, Snapshot
-from vergence_msgs.msg import EdgeVergence, GazeState, VergenceError
+from vergence_msgs.msg import BoxVergence, EdgeVergence, GazeState, VergenceError
 from vergence_rig.stream import Stream
 
 TOPICS = ("vergence/edge", "vergence/error", "vergence/box", "gaze/state", "joint_command", "joint_states")
@@ -55,6 +55,17 @@ def test_metric_gaze_joints_and_rates_are_shown():
     assert re.search(r"pan_left +\+28\.65° .*\[.*#.*\] .*-> +\+14\.32°", text)
     assert re.search(r"joint_states +30\.0 Hz +0\.00 s ago", text)
     assert "to inf" in text
+
+
+def test_the_distance_of_a_detected_target_has_its_interval():
+    made = filled()
+    face = BoxVergence(class_name="face", center_horizontal_px=12.5)
+    face.distance_m, face.distance_low_m, face.distance_high_m = 1.0, 0.85, 1.2
+    made["vergence/box"].add(face, 10.0)
+    (line,) = (line for line in view(made) if "boxes face" in line)
+    assert re.search(r"boxes face +12\.50 px  1\.00 m \(0\.85 to 1\.20 m\)", line)
+    face.distance_m = math.nan
+    assert "0.85" not in next(line for line in view(made) if "boxes face" in line)
 
 
 def test_no_line_is_wider_than_the_terminal():

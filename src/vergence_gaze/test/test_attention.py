@@ -11,7 +11,7 @@ import pytest
 
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.control.report import GazeReport
-from vergence_gaze.estimation.observations import PointSighting
+from vergence_gaze.estimation.observations import JointResolution, PointSighting
 from vergence_gaze.goals.goal import Goal, GoalKind, ObjectRequest, Outcome, Result
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.phases import Phase
@@ -214,9 +214,20 @@ def test_stop_pauses_it_until_a_policy_is_set() -> None:
     report = run.until(10.0)
     assert len(run.commands) == sent
     assert report.phase is Phase.IDLE
+    assert report.attention == "social: stopped until a policy is set or a goal is sent"
     run.controller.set_attention("social", run.head.time_s)
     run.until(14.0)
     assert len(run.commands) > sent
+
+
+def test_other_steps_of_the_servos_do_not_disturb_it() -> None:
+    run = Run()
+    assert run.until(2.5).verged
+    steps = JointResolution(run.head.time_s, dict.fromkeys(("pan_left", "pan_right", "tilt"), 0.002))
+    run.controller.step(run.head.time_s, [steps])
+    run.until(3.5)
+    assert all("in view is face" in report.attention for report in run.reports[-80:])
+    assert all(report.phase is Phase.FIXATE for report in run.reports[-80:])
 
 
 def test_disabled_holds_the_eyes_still_and_enabling_attends_again() -> None:

@@ -1,6 +1,7 @@
 """Distance and its interval: covariance by numbers, parallel axes, and what the visual encoder adds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,3 +64,10 @@ def test_the_visual_encoder_narrows_the_interval_until_a_pan_moves() -> None:
     offset.on_pan_moved(100.0)
     assert not offset.update(99.0, 0.002, 0.0004)
     assert target_position(estimate(1.0), HEAD, variances, offset).distance_m == pytest.approx(before.distance_m)
+
+
+def test_a_baseline_known_to_one_percent_gives_distances_known_to_one_percent() -> None:
+    head = Kinematics(replace(RIG, baseline_sigma_m=0.01 * RIG.baseline_m))
+    for distance_m in (0.3, 1.5):
+        position = target_position(estimate(distance_m, sigma_rad=1e-6), head, NOTHING)
+        assert position.high_m - position.low_m == pytest.approx(2 * 1.9 * 0.01 * distance_m, rel=0.05)

@@ -50,8 +50,8 @@ class AttentionParameters(Parameters):
         1.0, "time on the object that is glanced at, before the eyes return", unit="s", minimum=0.1, maximum=60
     )
     scan_speed_rad_s: float = parameter(
-        0.55,
-        "largest speed of a joint while the room is scanned; images count up to exposure.still_speed_rad_s",
+        0.8,
+        "largest speed of a joint while the room is scanned; a faster scan blurs what the detector sees",
         unit="rad/s",
         minimum=0.02,
         maximum=10,

@@ -83,13 +83,14 @@ def test_rows_without_objectness_ask_for_the_layout_or_the_names(classes, onnx_m
         detector = load(path, **options)
         assert detector.layout.name == "yolov8_rows"
         assert detector.detect(picture()).class_ids.tolist() == [0, 1]
-    assert (
-        load(onnx_model("yolov8_rows", classes=classes, names=str(list(COCO_NAMES[:classes])))).layout.classes
-        == classes
-    )
+    names.write_text("one\n")
+    with pytest.raises(ModelLayoutError, match="could be yolov6 or yolox_decoded or yolov8_rows"):
+        load(path, labels=str(names))
+    named = load(onnx_model("yolov8_rows", classes=classes, names=str(list(COCO_NAMES[:classes]))))
+    assert named.layout.classes == classes
 
 
-def test_the_output_s_name_tells_decoded_yolox_from_the_first_yolov6(onnx_model):
+def test_the_name_of_the_output_distinguishes_decoded_yolox_from_the_first_yolov6(onnx_model):
     assert load(onnx_model("yolox_decoded", renamed="outputs")).layout.name == "yolov6"
     with pytest.raises(ModelLayoutError, match="could be yolov6 or yolox_decoded or yolov8_rows"):
         load(onnx_model("yolox_decoded", renamed="boxes_and_scores"))

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from vergence_metric.testing.rendered_boards import Stage, gaze, true_pixel
+from vergence_metric.tracking import corner_cluster_tracker
+from vergence_metric.tracking.modelled_tracker import ModelledTracker
 from vergence_metric.tracking.registry import tracker_names
 from vergence_metric.tracking.request import TrackRequest
 from vergence_metric.tracking.track import TrackStatus
@@ -71,6 +73,22 @@ def test_what_covers_it_is_not_followed_and_it_is_found_again(stage):
     for one in stage.tracks[1:]:
         assert (one.status is TrackStatus.LOST) == math.isnan(one.left_px[0])
         assert one.status is TrackStatus.OK or one.reason
+
+
+@pytest.mark.parametrize("requested", [True, False])
+def test_a_target_with_too_few_corners_is_followed_by_its_appearance(monkeypatch, requested):
+    monkeypatch.setattr(corner_cluster_tracker, "_FEW", 1000)
+    cv2.setRNGSeed(1)
+    stage = Stage("corner_cluster")
+    if requested:
+        stage.show(PLACE, gaze(PLACE))
+        ask(stage, gaze(PLACE))
+    for k in range(12):
+        track = stage.show(PLACE + np.array([0.0, 0.001 * k, 0.0]), gaze(PLACE))
+    assert isinstance(stage.tracker, ModelledTracker)
+    assert stage.tracker.model is None
+    assert (track.status, track.goal_id) == (TrackStatus.OK, 5 if requested else 0), track.reason
+    assert np.abs(stage.errors[-1][:2]).max() < 2.5
 
 
 def test_a_new_request_replaces_the_old_one(stage):

@@ -55,6 +55,18 @@ def test_the_disparity_of_a_slanted_thing_is_that_of_the_point_that_was_looked_a
     assert track.disparity_px == pytest.approx(0.0, abs=0.4)
 
 
+def test_a_target_is_followed_to_the_border_beyond_which_the_point_looked_at_lies(stage):
+    center, beside = np.array([0.35, 0.0, 0.0]), np.array([0.0, -0.02, 0.0])
+    eyes = gaze(center + beside)
+    stage.lock(center, eyes)
+    beyond = 0
+    for step in range(60):
+        turned = EyeAngles(eyes.pan_left_rad + 0.012 * step, eyes.pan_right_rad + 0.012 * step, eyes.tilt_rad)
+        track = stage.show(center, turned)
+        beyond += track.status is TrackStatus.OK and true_pixel(center + beside, True, turned)[0] > 640.0
+    assert beyond
+
+
 @pytest.mark.parametrize("servo_step_deg", [0.0, 1.0])
 def test_it_follows_20_degrees_a_second(stage, servo_step_deg):
     def target(moved_deg):

@@ -96,7 +96,7 @@ class Kinematics:
             for side, mount in ((1.0, rig.left_mount), (-1.0, rig.right_mount))
         )
         self._mounts = (rig.left_mount, rig.right_mount)
-        self.baseline_m = rig.baseline_m
+        self.baseline_m, self.baseline_sigma_m = rig.baseline_m, rig.baseline_sigma_m
         self.pitch_rad = rig.mean_pitch_rad
         """Of both eyes' axes on their pan axes [rad], > 0 down."""
         self._tilt_axis_x, self._tilt_axis_z = rig.tilt_axis_x_m, rig.tilt_axis_z_m

@@ -155,6 +155,7 @@ class Rig:
 
     The tilt axis passes (tilt_axis_x_m, 0, tilt_axis_z_m). `zero_sigma_rad` is the standard deviation of each pan's
     zero and yaw together: distances by the joints are as uncertain, and commands may diverge by as much.
+    `baseline_sigma_m` is that of the distance between the lenses: distances are as uncertain, relatively.
     """
 
     baseline_m: float = 0.065
@@ -167,10 +168,12 @@ class Rig:
     tilt_axis_x_m: float = 0.0
     tilt_axis_z_m: float = 0.0
     zero_sigma_rad: float = 0.0
+    baseline_sigma_m: float = 0.0
 
     def __post_init__(self) -> None:
         _check_number("baseline_m", self.baseline_m, 1e-3, 10.0, "m")
         _check_number("zero_sigma_rad", self.zero_sigma_rad, 0.0, 0.2, "rad")
+        _check_number("baseline_sigma_m", self.baseline_sigma_m, 0.0, 0.1, "m")
         _check_number("tilt_axis_x_m", self.tilt_axis_x_m, -1.0, 1.0, "m")
         _check_number("tilt_axis_z_m", self.tilt_axis_z_m, -1.0, 1.0, "m")
         _check_number("minimum_vergence_rad", self.minimum_vergence_rad, 0.0, 0.5 * math.pi, "rad")

@@ -12,7 +12,14 @@ from vergence_rig.servo import PRESETS, ServoSpec
 from vergence_rig.spelling import spelling_hint
 from vergence_rig.yaml_file import YamlFileError, read_yaml
 
-_NUMBERS = ("baseline_m", "tilt_axis_x_m", "tilt_axis_z_m", "zero_sigma_rad", "minimum_vergence_rad")
+_NUMBERS = (
+    "baseline_m",
+    "tilt_axis_x_m",
+    "tilt_axis_z_m",
+    "zero_sigma_rad",
+    "baseline_sigma_m",
+    "minimum_vergence_rad",
+)
 _GROUPS = {
     "left_camera": CameraSpec(),
     "right_camera": CameraSpec(),

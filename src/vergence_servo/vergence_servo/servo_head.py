@@ -180,6 +180,11 @@ class ServoHead:
         self.hold(now_s)
 
     @property
+    def trajectory(self) -> Trajectory | None:
+        """The trajectory that is followed; None if there is none."""
+        return None if self._trajectory is None else self._trajectory[0]
+
+    @property
     def parked(self) -> bool:
         """True if every commanded servo that works has been sent to its commanded angle."""
         commanded = [(self.channels[name], wanted) for name, wanted in self._wanted_rad.items()]

@@ -167,6 +167,7 @@ def test_marks_follow_the_camera_and_its_mount() -> None:
 
 def test_an_uncalibrated_camera_is_scaled_from_the_rig() -> None:
     marks = EyeMarks(default_rig())
+    assert marks.marks([])[0]["fovea"] == [319.5, 239.5]
     for left in (True, False):
         marks.set_camera(left, None, 320, 240)
     assert marks.marks([])[0]["fovea"] == [159.5, 119.5]

@@ -183,6 +183,7 @@ def _track_request(message: Any) -> TrackRequest:
         left_eye=message.eye == message.EYE_LEFT,
         pixel=(float(message.x_px), float(message.y_px)),
         extent_px=(float(message.width_px), float(message.height_px)) if sized else None,
+        motion=bool(getattr(message, "motion", False)),  # recordings of before have no such field
     )
 
 

@@ -22,7 +22,8 @@ class BoxFigures:
 
     `left_minus_right_px` is in the order of CORNERS. `center_px` and `refined_px` are the disparities of the boxes'
     centres and of the surface inside them, (horizontal, vertical). `left_xyxy_px` and `right_xyxy_px` are the boxes,
-    `scores` the detector's for (left, right).
+    `scores` the detector's for (left, right). `left_point_px` and `right_point_px` are what a goal looks at: between
+    the eyes of a face, else the box's middle.
     """
 
     status: str
@@ -34,6 +35,8 @@ class BoxFigures:
     scores: Pair
     left_xyxy_px: Corners
     right_xyxy_px: Corners
+    left_point_px: Pair = (math.nan, math.nan)
+    right_point_px: Pair = (math.nan, math.nan)
 
     @classmethod
     def from_result(cls, result: "BoxVergenceResult") -> "BoxFigures":
@@ -51,6 +54,8 @@ class BoxFigures:
             scores=(left_score, right_score),
             left_xyxy_px=left_xyxy,
             right_xyxy_px=right_xyxy,
+            left_point_px=result.left.point_px if result.left else (math.nan, math.nan),
+            right_point_px=result.right.point_px if result.right else (math.nan, math.nan),
         )
 
     @classmethod
@@ -72,6 +77,8 @@ class BoxFigures:
             scores=(message.left.score, message.right.score),
             left_xyxy_px=boxes[0],
             right_xyxy_px=boxes[1],
+            left_point_px=(message.left.point_x_px, message.left.point_y_px),
+            right_point_px=(message.right.point_x_px, message.right.point_y_px),
         )
 
     @property
@@ -98,6 +105,8 @@ class BoxFigures:
             "scores": _numbers(self.scores),
             "left_xyxy_px": _numbers(self.left_xyxy_px),
             "right_xyxy_px": _numbers(self.right_xyxy_px),
+            "left_point_px": _numbers(self.left_point_px),
+            "right_point_px": _numbers(self.right_point_px),
         }
 
 

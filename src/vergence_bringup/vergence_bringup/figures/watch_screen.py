@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from vergence_rig.stream import Stream
 
@@ -83,7 +84,8 @@ class Screen:
             )
         box = snapshot.streams["vergence/box"].message
         if box is not None:
-            found = f"{box.class_name or 'no target'} {_figure(box.center_horizontal_px)} px  {box.reason}"
+            found = f"{box.class_name or 'no target'} {_figure(box.center_horizontal_px)} px{_distance(box)}"
+            found = f"{found}  {box.reason}"
             yield (("warn" if box.status else "", f"  boxes {found}"),)
 
     def _joints(self, snapshot: Snapshot) -> Iterator[tuple[tuple[str, str], ...]]:
@@ -143,6 +145,13 @@ class _Painter:
 
 def _degrees(angle_rad: float) -> str:
     return "    -    " if not math.isfinite(angle_rad) else f"{math.degrees(angle_rad):+7.2f}°"
+
+
+def _distance(box: Any) -> str:
+    """Return the distance of a detected target with its interval of 95 %; "" where it is not known."""
+    if not box.distance_m > 0.0:
+        return ""
+    return f"  {box.distance_m:.2f} m ({box.distance_low_m:.2f} to {box.distance_high_m:.2f} m)"
 
 
 def _figure(value: float) -> str:

@@ -12,6 +12,7 @@ from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
 from vergence_bringup.commands.look_request import (
@@ -24,11 +25,24 @@ from vergence_bringup.commands.look_request import (
 from vergence_bringup.graph_errors import GraphError
 from vergence_common.start import checked_namespace, init
 from vergence_msgs.action import LookAt
+from vergence_msgs.msg import GazeGoal
 
 __all__ = ["add_arguments", "run"]
 
 _NOT_VERGED, _INTERRUPTED = 1, 130
-_CANCEL_S, _SLICE_S = 5.0, 0.1
+_CANCEL_S, _SLICE_S, _REASON_S = 5.0, 0.1, 2.0
+_ASKED = (
+    "kind",
+    "point",
+    "left_x_px",
+    "left_y_px",
+    "right_x_px",
+    "right_y_px",
+    "class_name",
+    "version_rad",
+    "tilt_rad",
+)
+"""What distinguishes a goal from others."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -68,16 +82,22 @@ class Look:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._sent: Any = None
+        self._rejected: list[GazeGoal] = []
+        self._goal: LookAt.Goal | None = None
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._node.create_subscription(GazeGoal, "gaze/goal", self._on_goal, latched)
         self._progress = _Progress()
 
     def at(self, request: LookRequest, time_limit_s: float, wait_s: float) -> int:
         """Send the goal, show its progress until it ends, and return the exit status. Raises GraphError."""
         self._wait_for_controller(wait_s)
         print(f"looking at {request.text}", flush=True)
-        self._sent = self._client.send_goal_async(_goal(request, time_limit_s), feedback_callback=self._on_feedback)
+        self._goal = _goal(request, time_limit_s)
+        self._sent = self._client.send_goal_async(self._goal, feedback_callback=self._on_feedback)
         handle = self._spin_until(self._sent)
         if not handle.accepted:
-            raise GraphError("gaze/look_at refused the goal")
+            print(self._rejection(), flush=True)
+            return _NOT_VERGED
         answer = self._spin_until(handle.get_result_async())
         self._progress.end()
         if answer.status == GoalStatus.STATUS_UNKNOWN:
@@ -88,6 +108,22 @@ class Look:
         place = (point.x, point.y, point.z)
         print(result_line(name, result.time_s, result.reason, place, frame, result.vergence_rad), flush=True)
         return 0 if result.result == LookAt.Result.VERGED else _NOT_VERGED
+
+    def _rejection(self) -> str:
+        """Return why the goal was rejected, as gaze/goal says right after."""
+        deadline_s = time.monotonic() + _REASON_S
+        while not self._rejected and time.monotonic() < deadline_s:
+            self._spin_once()
+        if not self._rejected:
+            return "the goal was rejected, and gaze/goal says not why"
+        report = self._rejected[-1]
+        return f"{result_name(report.result)}: {report.reason}"
+
+    def _on_goal(self, report: GazeGoal) -> None:
+        # The last one is latched: one of another goal may come first.
+        same = self._goal is not None and all(getattr(report, name) == getattr(self._goal, name) for name in _ASKED)
+        if same and report.state == GazeGoal.REJECTED:
+            self._rejected.append(report)
 
     def cancel(self) -> None:
         """Cancel the goal, if one was sent."""

@@ -18,7 +18,15 @@ OPERATOR_TOPICS = ("/joint_command", "/gaze/attention", "/gaze/target", "/rosout
 _COMPRESSED = tuple(f"/{eye}/image_raw/compressed" for eye in EYES)
 _DETECTIONS = tuple(f"/vergence/{eye}_detections" for eye in EYES)
 _SHOWN = (
-    *("/gaze/state", "/joint_states", "/joint_command", "/vergence/edge", "/vergence/error", "/vergence/track"),
+    *(
+        "/gaze/state",
+        "/gaze/goal",
+        "/joint_states",
+        "/joint_command",
+        "/vergence/edge",
+        "/vergence/error",
+        "/vergence/track",
+    ),
     *("/vergence/box", "/vergence/detections", "/vergence/detector_classes", "/vergence/overlay", "/diagnostics"),
     *(f"/{eye}/{topic}" for eye in EYES for topic in ("camera_info", "image_raw", "image_raw/compressed")),
 )
@@ -30,6 +38,11 @@ SOMETIMES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "web_node": ((), _SHOWN),
 }
 """Topics that a node publishes and subscribes only with some parameters or installed packages, or while it is used."""
+OPTIONAL_ACTIONS = {
+    "gaze_controller_node": ("/gaze/point_head",),
+    "servo_node": ("/servo_node/follow_joint_trajectory",),
+}
+"""Actions that a node serves only where their messages are installed."""
 _PARAMETER_SERVICES = ("list_parameters", "describe_parameters", "get_parameters", "set_parameters")
 CLOCK = "/clock"
 """Subscribed by every node that uses simulated time."""
@@ -83,6 +96,7 @@ def with_sometimes(executable: str, endpoints: Endpoints) -> Endpoints:
         publish=endpoints.publish.union(publish),
         subscribe=endpoints.subscribe.union(subscribe, (CLOCK,)),
         request=endpoints.request.union(_parameter_services() if executable == "web_node" else ()),
+        execute=endpoints.execute.union(OPTIONAL_ACTIONS.get(executable, ())),
     )
 
 

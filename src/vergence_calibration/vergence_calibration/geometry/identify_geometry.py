@@ -152,7 +152,11 @@ def solved(
     sigmas = np.sqrt(np.diag(solution.covariance))
     check_certain(sigmas)
     return FoundGeometry(
-        replace(rig_of(rig, solution.vector[: len(NAMES)], cameras), zero_sigma_rad=_pan_sigma_rad(views, solution)),
+        replace(
+            rig_of(rig, solution.vector[: len(NAMES)], cameras),
+            zero_sigma_rad=_pan_sigma_rad(views, solution),
+            baseline_sigma_m=_baseline_sigma_m(solution),
+        ),
         cameras,
         solution.vector[: len(NAMES)],
         sigmas,
@@ -222,6 +226,13 @@ def _joint_sigmas(solution: Solution) -> Array:
     """
     deviations = solution.vector[len(NAMES) :].reshape(-1, len(JOINT_NAMES))
     return np.maximum(np.sqrt((deviations**2).sum(axis=0) / (len(deviations) - 3)), _LEAST_JOINT_SIGMA_RAD)
+
+
+def _baseline_sigma_m(solution: Solution) -> float:
+    """Return the standard deviation of the distance between the lenses; that between the pan axes was given [m]."""
+    places = [index("lens_y_m", eye) for eye in EYES]
+    own = solution.covariance[np.ix_(places, places)]
+    return round(math.sqrt(max(float(own[0, 0] + own[1, 1] - 2.0 * own[0, 1]), 0.0)), 6)
 
 
 def _pan_sigma_rad(views: HeadViews, solution: Solution) -> float:

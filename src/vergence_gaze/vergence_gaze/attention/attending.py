@@ -35,17 +35,21 @@ class Attending:
         self.configure(rig, parameters)
 
     def configure(self, rig: Rig, parameters: GazeParameters) -> None:
-        """Use another description of the head or other parameters."""
+        """Start again with other parameters."""
         self._p, self.engaged = parameters.attention, False
+        self._vergence_rad, self._tilt_enabled = parameters.target.prior_vergence_rad, parameters.control.tilt_enabled
         self._manager.configure(parameters.attention)
+        self.set_rig(rig)
+
+    def set_rig(self, rig: Rig) -> None:
+        """Use another description of the head; what is looked at stays."""
         self.limits = SmoothLimits(rig, self._p.speed_rad_s, self._p.acceleration_rad_s2)
         """Of commands while attention is engaged."""
-        vergence_rad, tilt_enabled = parameters.target.prior_vergence_rad, parameters.control.tilt_enabled
+        vergence_rad, tilt_enabled = self._vergence_rad, self._tilt_enabled
         self._patterns: dict[bool, Callable[[], Pattern]] = {
             True: lambda: RandomPattern(rig, tilt_enabled, vergence_rad, self._random),
             False: lambda: SearchPattern(rig, tilt_enabled, vergence_rad),
         }
-        self._vergence_rad = vergence_rad
         self._use_policy()
 
     def _use_policy(self) -> None:
@@ -134,4 +138,6 @@ class Attending:
         """Return the policy, what is looked at and why, as gaze/state reports it."""
         if self._manager.policy == DISABLED or self.engaged:
             return self._manager.describe()
+        if self._paused:
+            return f"{self._manager.policy}: stopped until a policy is set or a goal is sent"
         return f"{self._manager.policy}: waiting, what was asked for comes first"

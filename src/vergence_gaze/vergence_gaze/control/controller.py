@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,8 @@ from vergence_gaze.laws import make_law
 from vergence_gaze.laws.protocol import ControlInput
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.phases import Phase, PhaseMachine, Situation
+from vergence_rig.geometry import from_version_vergence
+from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
@@ -48,6 +50,9 @@ _LIMITED_RAD = math.radians(1.0)
 _HOLD_S = 0.3
 _CLOCK_JUMP_S = 1.0
 _UNKNOWN = np.full(3, np.nan)
+
+
+Request: TypeAlias = RequestedTarget | RequestedPose | ClassRequest | MotionRequest
 
 
 class GazeController:
@@ -69,6 +74,7 @@ class GazeController:
         self._command_s = math.nan
         self._send_until_s = -math.inf
         self._beyond_limits = False
+        self._goal_speed_rad_s = math.inf
         self._feedback = FeedbackMonitor()
         self._perception = Perception(rig, parameters, _driven(parameters))
         self._attention = Attending(rig, parameters)
@@ -110,6 +116,11 @@ class GazeController:
         return (self._active and self._pose is None) or self._attention.policy != DISABLED
 
     @property
+    def kinematics(self) -> Kinematics:
+        """Those of the head as it is described now."""
+        return self._perception.kinematics
+
+    @property
     def goal_id(self) -> int | None:
         """The active goal, None if there is none."""
         return self._goals.goal_id
@@ -141,7 +152,8 @@ class GazeController:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
         self._goals.end(Result.PREEMPTED, "preempted by a newer goal", now_s)
-        self._goals.start(goal_id, goal, now_s, self._p)
+        self._goal_speed_rad_s, slow_s = self._pace(goal, request)
+        self._goals.start(goal_id, goal, now_s, self._p, slow_s)
         self._feedback.retry()
         self._activate(now_s)
         self._perception.judge.restart()
@@ -169,11 +181,35 @@ class GazeController:
         self._phases.enter(Phase.VERGE, "new goal", now_s)
         return goal_id
 
-    def _resolved(self, goal: Goal, now_s: float) -> RequestedTarget | RequestedPose | ClassRequest | MotionRequest:
+    def _resolved(self, goal: Goal, now_s: float) -> Request:
         if not self._enabled:
             raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
         kinematics, history = self._perception.kinematics, self._perception.history
         return resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
+
+    def _pace(self, goal: Goal, request: Request) -> tuple[float, float]:
+        """Return the largest speed of a goal [rad/s], and how much time it takes longer than at full speed [s]."""
+        if isinstance(request, (ClassRequest, MotionRequest)):
+            return goal.max_speed_rad_s, 0.0
+        if isinstance(request, RequestedPose):
+            wanted = request.joints_rad
+        else:
+            eyes = from_version_vergence(*(float(angle) for angle in request.angles_rad))
+            wanted = np.array([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad])
+        travel_rad = np.abs(np.where(self._driven, wanted - self._perception.history.reported_rad, 0.0))
+        longest_rad = float(travel_rad.max())
+        speed_rad_s = goal.max_speed_rad_s
+        if goal.min_duration_s > 0 and longest_rad > 0:
+            speed_rad_s = min(speed_rad_s, longest_rad / goal.min_duration_s)
+        full_s = float((travel_rad / self._limits.speed_rad_s).max())
+        slow_s = max(longest_rad / speed_rad_s if math.isfinite(speed_rad_s) else 0.0, goal.min_duration_s)
+        return speed_rad_s, max(slow_s - full_s, 0.0)
+
+    @property
+    def _speed_rad_s(self) -> Array:
+        """The largest speeds of the joints (3,) now: their own, or the active goal's."""
+        own_rad_s = self._present_limits.speed_rad_s
+        return own_rad_s if self._goals.goal_id is None else np.minimum(own_rad_s, self._goal_speed_rad_s)
 
     def cancel(self, now_s: float, goal_id: int | None = None) -> bool:
         """End the active goal (or only if it is `goal_id`) as CANCELLED and hold still; False if there is none."""
@@ -231,7 +267,8 @@ class GazeController:
         if not self._fault(now_s):
             self._attend(now_s)
         desired = self._decide(now_s, command) if self._active else self._rest
-        sent = self._present_limits.limited(desired, command, now_s - self._command_s, history.reported_rad)
+        elapsed_s = now_s - self._command_s
+        sent = self._present_limits.limited(desired, command, elapsed_s, history.reported_rad, self._speed_rad_s)
         self._note_limits(desired)
         self._command, self._command_s = sent, max(now_s, self._command_s)
         if sending:
@@ -336,7 +373,7 @@ class GazeController:
             self._command = np.array(rig.eye_angles(self._described.joint_angles(self._command.tolist())))
         self._described, self._rig = rig, rig.in_eye_angles()
         self._limits = CommandLimits(self._rig)
-        self._attention.configure(self._rig, self._p)
+        self._attention.set_rig(self._rig)
         self._perception.set_rig(self._rig)
         self._law = make_law(self._rig, self._p)
 
@@ -370,7 +407,7 @@ class GazeController:
             if self._attention.engaged:
                 place = self._attention.next_pose(now_s, shaft_rad)
             else:
-                place = self._searcher.next_pose(now_s, shaft_rad, self._limits.speed_rad_s)
+                place = self._searcher.next_pose(now_s, shaft_rad, self._speed_rad_s)
             return np.where(self._driven, place, np.nan)
         self._stop_searching()
         if phase in (Phase.LOST, Phase.IDLE):
@@ -408,7 +445,7 @@ class GazeController:
             shaft_rad=self._perception.history.shaft_rad,
             commanded_rad=command,
             driven=self._driven,
-            speed_rad_s=self._present_limits.speed_rad_s,
+            speed_rad_s=self._speed_rad_s,
             lead_s=self._lead_s,
             half_play_rad=self._perception.history.half_play_rad,
         )

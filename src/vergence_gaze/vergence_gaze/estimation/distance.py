@@ -67,7 +67,7 @@ def target_position(
         estimate = replace(estimate, angles_rad=angles)
     covariance = _SHARED_NOISE * estimate.covariance
     covariance[0, 0] += 0.25 * (left + right)
-    covariance[1, 1] += left + right
+    covariance[1, 1] += left + right + _of_baseline(estimate, kinematics)
     covariance[0, 1] += 0.5 * (right - left)
     covariance[1, 0] += 0.5 * (right - left)
     covariance[2, 2] += tilt
@@ -82,6 +82,11 @@ def target_position(
     except GeometryError:
         return TargetPosition(UNKNOWN.point_m, UNKNOWN.covariance_m2, math.inf, low, high)
     return TargetPosition(point, jacobian @ covariance @ jacobian.T, float(np.linalg.norm(point)), low, high)
+
+
+def _of_baseline(estimate: TargetEstimate, kinematics: Kinematics) -> float:
+    """Return the variance [rad^2] of the vergence that makes distances as uncertain as the baseline, relatively."""
+    return (estimate.vergence_rad * kinematics.baseline_sigma_m / kinematics.baseline_m) ** 2
 
 
 def _distance(estimate: TargetEstimate, vergence_rad: float, kinematics: Kinematics) -> float:

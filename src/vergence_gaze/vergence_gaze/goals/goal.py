@@ -40,7 +40,9 @@ class Goal:
 
     `stamp_s` is the stamp of the image that pixels were read from; NaN for the newest. `depth_m` is along the eye's
     ray, NaN if unknown. `left_eye` says which eye a single pixel is of; `extent_rad` are the angular width and height
-    of the object there, NaN if unknown.
+    of the object there, NaN if unknown. While the goal is active no joint turns faster than `max_speed_rad_s`, nor so
+    fast that it would take less than `min_duration_s`. Without `needs_images` a point is reached by the joints alone
+    where no images arrive.
     """
 
     kind: GoalKind
@@ -56,6 +58,9 @@ class Goal:
     class_name: str = ""
     stamp_s: float = math.nan
     time_limit_s: float = 0.0
+    max_speed_rad_s: float = math.inf
+    min_duration_s: float = 0.0
+    needs_images: bool = True
 
 
 @dataclass(frozen=True)

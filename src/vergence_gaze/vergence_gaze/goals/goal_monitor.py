@@ -41,6 +41,7 @@ class GoalMonitor:
         self._outcomes: list[Outcome] = []
         self._goal_id: int | None = None
         self._since_s = self._limit_s = math.nan
+        self._needs_images = True
         self._limited_since_s = self._ambiguous_since_s = self._faulty_since_s = math.nan
 
     @property
@@ -61,10 +62,11 @@ class GoalMonitor:
         """Record the outcome of a goal that was never started."""
         self._outcomes.append(Outcome(goal_id, result, reason, 0.0))
 
-    def start(self, goal_id: int, goal: Goal, now_s: float, parameters: GazeParameters) -> None:
-        """Make a goal the active one."""
+    def start(self, goal_id: int, goal: Goal, now_s: float, parameters: GazeParameters, slow_s: float = 0.0) -> None:
+        """Make a goal the active one; `slow_s` is how much longer it takes for what it asks for."""
         self._goal_id, self._since_s = goal_id, now_s
-        self._limit_s = goal.time_limit_s or parameters.control.time_limit_s
+        self._limit_s = goal.time_limit_s or parameters.control.time_limit_s + slow_s
+        self._needs_images = goal.needs_images
         self._limited_since_s = self._ambiguous_since_s = self._faulty_since_s = math.nan
 
     def end(self, result: Result, reason: str, now_s: float) -> None:
@@ -113,7 +115,7 @@ class GoalMonitor:
             return Result.LIMITS, "the target is beyond the joints' limits"
         if p.now_s - self._ambiguous_since_s > parameters.control.ambiguous_after_s:
             return Result.AMBIGUOUS, p.ambiguity
-        if p.now_s - max(p.image_s, self._since_s) > parameters.control.no_images_s:
+        if self._needs_images and p.now_s - max(p.image_s, self._since_s) > parameters.control.no_images_s:
             return Result.NO_IMAGES, p.images_fault or "no results from the images arrive"
         if p.now_s - self._since_s > self._limit_s:
             if p.ambiguity:

@@ -67,6 +67,12 @@ def resolve_goal(
     if not 0 <= goal.time_limit_s <= LONGEST_GOAL_S:
         allowed = f"time_limit_s must be 0 (default) to {LONGEST_GOAL_S:g} [s]"
         raise GoalError(Result.INVALID, f"{allowed}: got {goal.time_limit_s!r}")
+    if not goal.max_speed_rad_s > 0:
+        got = goal.max_speed_rad_s
+        raise GoalError(Result.INVALID, f"the largest speed must be above 0, or 0 for no limit [rad/s]: got {got!r}")
+    if not 0 <= goal.min_duration_s <= LONGEST_GOAL_S:
+        got = goal.min_duration_s
+        raise GoalError(Result.INVALID, f"the least duration must be 0 to {LONGEST_GOAL_S:g} [s]: got {got!r}")
     if goal.kind is GoalKind.CLASS:
         if not goal.class_name:
             raise GoalError(Result.INVALID, "class_name must be one of the detector's classes: got an empty text")

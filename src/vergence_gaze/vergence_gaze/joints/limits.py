@@ -50,7 +50,14 @@ class CommandLimits:
             and angles_rad[1] - angles_rad[0] >= self.minimum_vergence_rad - tolerance_rad
         )
 
-    def limited(self, desired_rad: Array, last_rad: Array | None, elapsed_s: float, present_rad: Array) -> Array:
+    def limited(
+        self,
+        desired_rad: Array,
+        last_rad: Array | None,
+        elapsed_s: float,
+        present_rad: Array,
+        speed_rad_s: Array | None = None,
+    ) -> Array:
         """Return the command (3,) to send.
 
         Args:
@@ -58,13 +65,14 @@ class CommandLimits:
             last_rad: the last command sent, or None before the first, which is the nearest allowed to `present_rad`.
             elapsed_s: time since the last command; nothing moves if it is not a positive number.
             present_rad: where the joints are reported (3,), finite.
+            speed_rad_s: largest speeds (3,); the joints' own if none.
         """
         if last_rad is None:
             return self.nearest(present_rad)
         if not (math.isfinite(elapsed_s) and elapsed_s > 0):
             return last_rad
         desired = self.nearest(np.where(np.isfinite(desired_rad), desired_rad, last_rad))
-        reach = self.speed_rad_s * min(elapsed_s, LONGEST_STEP_S)
+        reach = (self.speed_rad_s if speed_rad_s is None else speed_rad_s) * min(elapsed_s, LONGEST_STEP_S)
         move = np.minimum(np.maximum(desired - last_rad, -reach), reach)
         # The pans may arrive one after the other; a common fraction of the move keeps to the vergence limit on the way.
         room = last_rad[1] - last_rad[0] - self.minimum_vergence_rad

@@ -28,8 +28,16 @@ class SmoothLimits(CommandLimits):
         """Start from rest."""
         self._rate_rad_s = np.zeros(3)
 
-    def limited(self, desired_rad: Array, last_rad: Array | None, elapsed_s: float, present_rad: Array) -> Array:
+    def limited(
+        self,
+        desired_rad: Array,
+        last_rad: Array | None,
+        elapsed_s: float,
+        present_rad: Array,
+        speed_rad_s: Array | None = None,
+    ) -> Array:
         """See CommandLimits."""
+        speed = self.speed_rad_s if speed_rad_s is None else np.minimum(self.speed_rad_s, speed_rad_s)
         if last_rad is None or not (math.isfinite(elapsed_s) and elapsed_s > 0):
             self.restart()
             return super().limited(desired_rad, last_rad, elapsed_s, present_rad)
@@ -39,7 +47,7 @@ class SmoothLimits(CommandLimits):
         change = self._acceleration_rad_s2 * elapsed_s
         # The greatest speed from which a joint that slows down evenly stops at the desired angle.
         stopping = np.sqrt(change**2 + 2.0 * self._acceleration_rad_s2 * np.abs(off)) - change
-        wanted = np.sign(off) * np.minimum(stopping, self.speed_rad_s)
+        wanted = np.sign(off) * np.minimum(stopping, speed)
         rate = np.clip(wanted, self._rate_rad_s - change, self._rate_rad_s + change)
         sent = super().limited(last_rad + rate * elapsed_s, last_rad, elapsed_s, present_rad)
         self._rate_rad_s = (sent - last_rad) / elapsed_s

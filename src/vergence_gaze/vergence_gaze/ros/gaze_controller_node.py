@@ -28,8 +28,10 @@ from vergence_gaze.joints.frames import FrameError
 from vergence_gaze.parameter_groups import collected, gaze_groups
 from vergence_gaze.parameters import GazeNodeParameters, GazeParameters
 from vergence_gaze.ros import gaze_messages as convert
+from vergence_gaze.ros.goal_server import GoalServer
 from vergence_gaze.ros.look_at_server import LookAtServer
 from vergence_gaze.ros.point_frames import PointFrames
+from vergence_gaze.ros.point_head_server import make_point_head_server
 from vergence_gaze.ros.vision_input import VisionInput
 from vergence_msgs.msg import DetectorClasses, GazeState, ObjectRequest, TrackRequest
 from vergence_rig.camera import CameraModel, CameraModelError
@@ -59,11 +61,17 @@ class GazeControllerNode(Node):
         self._newest: GazeReport | None = None
         self._cycles = 0
         self._frames = PointFrames(self, self._controller)
-        self._look_at = LookAtServer(self, self._controller, self._frames, self._images, self._end_rest)
 
         diagnostics = Diagnostics(self)
         diagnostics.add("gaze", self._report)
         watch = watch_qos(self, diagnostics)
+        self._look_at = LookAtServer(self, self._controller, self._frames, self._images, watch)
+        self._servers: list[GoalServer] = [self._look_at]
+        point_head = make_point_head_server(self, self._controller, self._frames)
+        if point_head is not None:
+            self._servers.append(point_head)
+        for server in self._servers:
+            server.on_request = self._end_rest
         self._command, self._to_command = watch.create_publisher(JointState, "joint_command"), convert.JointCommand()
         self._track_requests = watch.create_publisher(TrackRequest, "vergence/track_request")
         # Latched: what holds until the next message, for nodes that start later.
@@ -161,11 +169,13 @@ class GazeControllerNode(Node):
         elif not self._resting:
             self._resting = True
             self._timer.timer_period_ns = round(1e9 * max(self._period_s, _RESTING_PERIOD_S))
-        self._look_at.forward_cancels(now_s)
+        for server in self._servers:
+            server.forward_cancels(now_s)
         self._vision.update(self._controller.uses_images, monotonic())
         command = self._controller.step(now_s, arrived, self._joint_input.problem())
         self._newest = command.report
-        self._look_at.on_cycle(command)
+        for server in self._servers:
+            server.on_cycle(command)
         self._publish(command, now_s)
 
     def _publish(self, command: Command, now_s: float) -> None:
@@ -181,7 +191,8 @@ class GazeControllerNode(Node):
         if fixation_read and math.isfinite(report.fixation_m[0]):
             self._fixation.publish(convert.point_stamped(report.fixation_m, report.stamp_s))
         if self._cycles % _FEEDBACK_EVERY == 0:
-            self._look_at.publish_feedback(report)
+            for server in self._servers:
+                server.publish_feedback(report)
         if markers_read and self._cycles % _MARKERS_EVERY == 0:
             half = 0.5 * report.vergence_rad
             angles = np.array([report.version_rad - half, report.version_rad + half, report.tilt_rad])

@@ -19,6 +19,7 @@ from vergence_metric.boxes.patch_descriptor import descriptor_correlation, patch
 _SIZE_SIGMA = 0.12  # of the logarithm of the height
 _SIZE_FLOOR_PX = 2.0
 _APPEARANCE_SIGMA = 0.2  # of the descriptors' correlation from 1
+_FACE_APPEARANCE_SIGMA = 0.12  # of faces, which are brought to one place, turn and size
 _SCORE_SIGMA = 0.5
 _MOTION_SIGMA_PX = 12.0
 _DIVERGENCE_PX = 12.0  # beyond infinity: error of servos without feedback
@@ -93,7 +94,8 @@ def associate(
             if math.isfinite(cost):
                 cost += _motion_cost(a, b, expected)
                 correlation = descriptor_correlation(descriptors[0][i], descriptors[1][j])
-                cost += 0.0 if correlation is None else ((1.0 - correlation) / _APPEARANCE_SIGMA) ** 2
+                sigma = _FACE_APPEARANCE_SIGMA if a.landmarks_px and b.landmarks_px else _APPEARANCE_SIGMA
+                cost += 0.0 if correlation is None else ((1.0 - correlation) / sigma) ** 2
                 # Where each eye misses one of two similar objects, the two that are left must not be paired.
                 costs[i, j] = cost if cost <= parameters.max_cost else math.inf
     chosen = optimal_assignment(costs)

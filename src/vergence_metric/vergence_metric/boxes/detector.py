@@ -124,10 +124,13 @@ class Detector:
         warm_up = self._warm_up(named or None)
         try:
             return find_layout(warm_up, wanted)
-        except ModelLayoutError:
+        except ModelLayoutError as undecided:
             if named or not given:
                 raise
-            return find_layout(replace(warm_up, class_count=given), wanted)
+            try:
+                return find_layout(replace(warm_up, class_count=given), wanted)
+            except ModelLayoutError:
+                raise undecided from None
 
     def _warm_up(self, class_count: int | None) -> WarmUp:
         # Range and order of the channels change neither the outputs' shapes nor what recognition looks for in them.

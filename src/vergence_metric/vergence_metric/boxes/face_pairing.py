@@ -1,6 +1,6 @@
 """How well two faces, one of each eye, are one person's: by the shape that their landmarks make, its size, its depth.
 
-The eyes of persons are about 63 mm apart, as far as the head's: a face's size and its disparity tell the same distance.
+The eyes of persons are about 63 mm apart, as far as the head's: a face's size and its disparity give the same distance.
 """
 
 import math
@@ -12,7 +12,7 @@ from vergence_metric.boxes.detections import Box
 from vergence_metric.boxes.pair_geometry import PairGeometry
 
 _EYE_DISTANCE_M = 0.063
-_EYE_DISTANCE_SIGMA = 0.3  # of its logarithm: persons, children, pictures of persons
+_EYE_DISTANCE_SIGMA = 0.17  # of its logarithm: of men, women and children, and a landmark's error
 _JOINT_SIGMA_RAD = 0.006  # of the vergence, without feedback
 
 # Standard deviations of a landmark, and of the size that all of a face have, between the two eyes.

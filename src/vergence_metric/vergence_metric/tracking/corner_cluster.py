@@ -8,7 +8,6 @@ that was covered bit by bit is found again.
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,15 +20,13 @@ from vergence_metric.tracking.direction_filter import DirectionFilter
 from vergence_metric.tracking.eye_view import Pixel, Points
 from vergence_metric.tracking.known_corners import KnownCorners
 from vergence_metric.tracking.locking_tracker import is_inside
-from vergence_metric.tracking.modelled_tracker import Fix, ModelledTracker
+from vergence_metric.tracking.modelled_tracker import Fix
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair
 from vergence_metric.tracking.requested_target import USUAL_EXTENT_PX
 from vergence_metric.tracking.saccade_detector import EyeMotion
-from vergence_metric.tracking.segmentation import Region, Segmenter, layer_tolerance_px
+from vergence_metric.tracking.segmentation import Region
 from vergence_metric.tracking.target_depth import TargetDepth
-from vergence_rig.camera import CameraModel
-from vergence_rig.kinematics import Kinematics
 
 _WINDOW_PX = 128  # the foveal window's side, at most
 _MOST = 60
@@ -39,7 +36,6 @@ _SIGMA_PX = 0.5
 _COMMON_REACH_PX = 10  # by which all corners together may be off their prediction
 _TURNED_SHARE = 0.3  # of the way that the eyes have turned
 _LEAST, _LEAST_AGAIN, _SHARE_AGAIN = 2, 5, 0.4  # corners that locate a target; one that was hidden or jumps
-_FEW = 6
 _JUMP_PX = 4.0
 _UNBOUNDED_PX = 2.0 * USUAL_EXTENT_PX[0], 2.0 * USUAL_EXTENT_PX[1]  # of a target that has no bounds
 _LEAST_EXTENT_PX = (40.0, 40.0)
@@ -256,35 +252,3 @@ class CornerCluster:
         flat = left.matrix[:, :2] + np.outer(left.matrix[:, 2], plane)
         across = (px - left.origin_px) @ np.linalg.inv(flat).T
         return np.column_stack([across, across @ plane])
-
-
-def learn_corner_cluster(
-    pair: StoredPair,
-    point: Pixel,
-    extent_px: tuple[float, float] | None,
-    *,
-    estimator: DisparityEstimator,
-    parameters: TrackerParameters,
-    baseline_m: float,
-) -> CornerCluster | str:
-    """Return the cluster of corners at a point of a pair, or why there is none; see `modelled_tracker.Learn`."""
-    disparity = estimator.estimate(pair.left, pair.right, point)
-    region = Segmenter(parameters, estimator, baseline_m).segment(pair.left, pair.right, point, disparity, pair.views)
-    if extent_px is not None:
-        region = region._replace(center_px=point, extent_px=extent_px)
-    across = disparity.horizontal_px
-    tolerance_px = layer_tolerance_px(across, pair.views, baseline_m) if math.isfinite(across) else 0.0
-    cluster = CornerCluster(pair, point, region, disparity, tolerance_px, estimator, parameters)
-    if len(cluster.corners) < _FEW and extent_px is None and region.extent_px is not None:
-        # What was segmented is hardly a thing: the surface about the point is learnt without bounds.
-        wider = region._replace(center_px=point, extent_px=None)
-        cluster = CornerCluster(pair, point, wider, disparity, tolerance_px, estimator, parameters)
-    return cluster if len(cluster.corners) >= _LEAST else "it has no corners"
-
-
-def corner_cluster_tracker(
-    parameters: TrackerParameters, estimator: DisparityEstimator, camera: CameraModel, kinematics: Kinematics
-) -> ModelledTracker:
-    """Return the tracker `corner_cluster`; see `protocol.Tracker`."""
-    learn = partial(learn_corner_cluster, estimator=estimator, parameters=parameters, baseline_m=kinematics.baseline_m)
-    return ModelledTracker(learn, estimator, parameters, camera, kinematics)

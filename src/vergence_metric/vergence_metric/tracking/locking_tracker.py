@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable
-from typing import Generic, TypeVar
+from typing import Any
 
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.pairs.frame_motion import frame_motion_px
@@ -24,10 +24,8 @@ from vergence_rig.kinematics import Kinematics
 
 _KEPT_SHARE = 0.9  # of a saccade: the largest distance from the fovea at which the target was not left
 
-TargetT = TypeVar("TargetT")
 
-
-class LockingTracker(ABC, Generic[TargetT]):
+class LockingTracker(ABC):
     """Follows one target; `update` must be called with every pair, in order of their stamps.
 
     Subclasses implement `_requested_target`, `_lock` and `_follow`, and set `_target` to None with `_lost_s` when they
@@ -43,7 +41,7 @@ class LockingTracker(ABC, Generic[TargetT]):
     def reset(self) -> None:
         """Drop the target and the eyes' motion; the next lock has a new id."""
         self._saccades = SaccadeDetector(self._parameters)
-        self._target: TargetT | None = None
+        self._target: Any = None
         self._requested = False
         self._wants_lock = True
         self._stamp_s = self._lost_s = -math.inf
@@ -103,7 +101,7 @@ class LockingTracker(ABC, Generic[TargetT]):
         return self._lock(pair)
 
     @abstractmethod
-    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> TargetT:
+    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Any:
         """Return the target of a request, as it is in the pair in which it was asked for; the track's id is new."""
 
     @abstractmethod
@@ -111,7 +109,7 @@ class LockingTracker(ABC, Generic[TargetT]):
         """Lock on what lies at the fovea: set `_target`, call `_locked`; or return why there is nothing to lock on."""
 
     @abstractmethod
-    def _follow(self, target: TargetT, pair: StoredPair, motion: EyeMotion) -> Track:
+    def _follow(self, target: Any, pair: StoredPair, motion: EyeMotion) -> Track:
         """Return the track of the target in the next pair."""
 
     def _locked(self) -> int:

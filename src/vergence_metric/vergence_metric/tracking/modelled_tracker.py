@@ -7,7 +7,7 @@ cannot say.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 from vergence_metric.disparity.protocol import DisparityEstimator
 from vergence_metric.tracking.eye_view import Pixel
@@ -67,7 +67,7 @@ class Followed:
     seen_s: float
 
 
-class ModelledTracker(LockingTracker[Followed]):
+class ModelledTracker(LockingTracker):
     """Follows one target by a model that `learn` makes of it."""
 
     def __init__(
@@ -85,9 +85,9 @@ class ModelledTracker(LockingTracker[Followed]):
     def model(self) -> TargetModel | None:
         """The model of the target that is followed, None if there is none."""
         target = self._target
-        return None if target is None or isinstance(target.model, str) else target.model
+        return target.model if isinstance(target, Followed) and not isinstance(target.model, str) else None
 
-    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Followed:
+    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Any:
         point = request.pixel if request.left_eye else pixel_in_left_eye(request.pixel, pair, self._estimator)
         model = self._learn(pair, point, request.extent_px)
         return Followed(self._track_id, pair.stamp_s, request.goal_id, model, pair.stamp_s)

@@ -12,6 +12,7 @@ found again by that (`remembered_patch.py`), whatever lies at the fovea. Until t
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,7 @@ from vergence_rig.kinematics import Kinematics
 _UNMISTAKABLE_SIMILARITY = 0.8
 
 
-class TargetTracker(LockingTracker[Target]):
+class TargetTracker(LockingTracker):
     """Follows one target by its appearance; see `LockingTracker`."""
 
     def __init__(
@@ -53,7 +54,7 @@ class TargetTracker(LockingTracker[Target]):
         self._segmenter = Segmenter(parameters, estimator, kinematics.baseline_m)
         super().__init__(parameters, camera, kinematics)
 
-    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Target:
+    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Any:
         return requested_target(self._track_id, request, pair, self._estimator, self._parameters)
 
     def _lock(self, pair: StoredPair) -> Track:
@@ -96,6 +97,8 @@ class TargetTracker(LockingTracker[Target]):
                 return in_left_eye(target, sighting, "the eyes are in a saccade")
             return track_requested(target, target.depths, sighting, pair, self._estimator, p.place_spread_px)
         fixated = target.fixated_px(sighting.pixel)
+        if not is_inside(fixated, left):
+            fixated = sighting.pixel
         expected_px = target.expected_disparity(fixated, views)
         disparity = self._estimator.estimate(left, right, fixated, expected_px)
         if not disparity.ok and fixated != sighting.pixel:

@@ -30,6 +30,8 @@ from vergence_servo.commanders import conflict
 from vergence_servo.drivers.registry import find_backend
 from vergence_servo.parameters import ServoNodeParameters, parameter_groups
 from vergence_servo.ros import servo_messages as convert
+from vergence_servo.ros.trajectory_server import NAME as TRAJECTORY_ACTION
+from vergence_servo.ros.trajectory_server import make_trajectory_server
 from vergence_servo.servo_channel import RetryParameters, ServoChannel
 from vergence_servo.servo_hardware import ServoHardware
 from vergence_servo.servo_head import Mode
@@ -88,6 +90,7 @@ class ServoNode(Node):
         watch.create_subscription(JointState, "joint_command", self._on_command)
         watch.create_subscription(Float64MultiArray, "~/commands", self._on_commands)
         watch.create_subscription(JointTrajectory, "joint_trajectory", self._on_trajectory)
+        self._trajectories = make_trajectory_server(self, self._head, self._start_trajectory)
         self.create_service(SetBool, "~/enable", self._on_enable)
         self.create_service(Trigger, "~/park", lambda request, response: self._on_trigger(self._head.park, response))
         self.create_service(
@@ -105,6 +108,8 @@ class ServoNode(Node):
 
     def _step(self) -> None:
         pause_s = self._hardware.step()
+        if self._trajectories is not None:
+            self._trajectories.update(time.monotonic())
         if pause_s:
             self.get_logger().error(f"this node hung for {pause_s:.1f} s: its guardian has released the servos")
 
@@ -127,28 +132,38 @@ class ServoNode(Node):
         self._execute("~/commands", apply)
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
-        def apply(now_s: float) -> None:
-            points = convert.trajectory_points(message)
-            trajectory = Trajectory(message.joint_names, points, self._head.sent_rad())
-            stamp_ns, now_ns = to_nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
-            values: ServoNodeParameters = self._settings.value
-            delay_s = start_delay_s(stamp_ns, now_ns, values.command_max_age_s)
-            check_end(delay_s + trajectory.duration_s, values.trajectory_max_s)
-            self._head.follow(trajectory, now_s + delay_s, now_s)
+        self._execute("joint_trajectory", lambda now_s: self._follow(message, now_s))
 
-        self._execute("joint_trajectory", apply)
+    def _start_trajectory(self, message: JointTrajectory) -> float:
+        """Follow a trajectory of the action and return when it begins [s]; raises CommandRefusedError."""
+        begin_s: list[float] = []
+        refusal = self._execute(TRAJECTORY_ACTION, lambda now_s: begin_s.append(self._follow(message, now_s)))
+        if refusal is not None:
+            raise refusal
+        return begin_s[0]
 
-    def _execute(self, topic: str, apply: Callable[[float], None]) -> None:
+    def _follow(self, message: JointTrajectory, now_s: float) -> float:
+        points = convert.trajectory_points(message)
+        trajectory = Trajectory(message.joint_names, points, self._head.sent_rad())
+        stamp_ns, now_ns = to_nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds
+        values: ServoNodeParameters = self._settings.value
+        delay_s = start_delay_s(stamp_ns, now_ns, values.command_max_age_s)
+        check_end(delay_s + trajectory.duration_s, values.trajectory_max_s)
+        self._head.follow(trajectory, now_s + delay_s, now_s)
+        return now_s + delay_s
+
+    def _execute(self, topic: str, apply: Callable[[float], object]) -> CommandRefusedError | None:
         now_s = time.monotonic()
         try:
             apply(now_s)
         except CommandRefusedError as error:
             self._counts.refuse(topic, str(error), now_s)
             self.get_logger().warning(f"{topic} refused: {error}", throttle_duration_sec=1.0)
-            return
+            return error
         self._counts.accept(topic, now_s)
         self._head.step(now_s)
         self._end_rest()
+        return None
 
     def _end_rest(self) -> None:
         """Step and report at the full rate again, the pose before any motion first."""

@@ -58,6 +58,7 @@ _STATES: dict[str, tuple[Any, QoSProfile]] = {
 }
 _NOT_RATED = ("vergence/detector_classes",)
 _LONE_S = 0.15
+_AGE_EVERY_S = 0.3
 _EDGES_PERIOD_S = 0.15
 _LOOK_S = 1.0
 
@@ -88,7 +89,7 @@ class GraphInput:
 
     def _forget(self) -> None:
         self._streams = {topic: Stream() for topic in (*_STATES, "left/image", "right/image")}
-        self._ages_s = dict[str, float]()
+        self._ages_s, self._aged_s = dict[str, float](), dict[str, float]()
         self._decoded: dict[str, tuple[int, Any]] = {}
         self._pair, self._marks, self._health = EyePair(), EyeMarks(self._rig), Health()
         self._infos: dict[str, bytes] = {}
@@ -170,9 +171,11 @@ class GraphInput:
 
     def _note(self, topic: str, message: bytes) -> int:
         """Count a message; return its stamp [ns]."""
-        self._streams[topic].add(message, time.monotonic())
-        stamp_ns = stamp_of(message)
-        self._ages_s[topic] = (self._node.get_clock().now().nanoseconds - stamp_ns) * 1e-9
+        now_s, stamp_ns, stream = time.monotonic(), stamp_of(message), self._streams[topic]
+        stream.add(message, now_s)
+        if now_s - self._aged_s.get(topic, -math.inf) > _AGE_EVERY_S:
+            self._aged_s[topic] = now_s
+            self._ages_s[topic] = (self._node.get_clock().now().nanoseconds - stamp_ns) * 1e-9
         return stamp_ns
 
     def _on_image(self, eye: str, message: bytes) -> None:

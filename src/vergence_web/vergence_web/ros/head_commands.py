@@ -1,6 +1,7 @@
 """What a page asks of the head: goals of gaze/look_at, and the services that stop, enable and park it."""
 
 import math
+from collections import deque
 from functools import partial
 from time import monotonic
 from typing import Any
@@ -8,16 +9,19 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import SetBool, Trigger
 
 from vergence_common.stamps import from_nanoseconds
 from vergence_msgs.action import LookAt
+from vergence_msgs.msg import GazeGoal
 from vergence_rig.rig import Rig
 from vergence_web.requests import Answer, Command, DetectedClass, Message, Pixel
 from vergence_web.ros.answering import Reply, answering
 from vergence_web.ros.service_calls import ServiceCalls
 
-_ACCEPTED_WITHIN_S = 5.0
+_ACCEPTED_WITHIN_S, _REASON_WITHIN_S = 5.0, 2.0
+_LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _GAZE, _SERVO = "gaze_controller_node", "servo_node"
 _SERVICES = {
     "stop": (Trigger, f"{_GAZE}/stop", None),
@@ -39,6 +43,8 @@ class HeadCommands:
         self._sent: dict[int, tuple[float, Message, Reply]] = {}
         self._goals: dict[int, tuple[Any, Message, Reply]] = {}
         self._count = 0
+        self._unexplained: deque[tuple[float, Message, Reply]] = deque()
+        self._reasons: Any = None
 
     def available(self) -> dict[str, bool]:
         """Return whether what each command needs is there."""
@@ -63,6 +69,12 @@ class HeadCommands:
                 del self._sent[number]
                 text = f"gaze/look_at has not answered within {_ACCEPTED_WITHIN_S:g} s: try again"
                 reply(Answer(message.number, False, text))
+        while self._unexplained and monotonic() > self._unexplained[0][0]:
+            _, message, reply = self._unexplained.popleft()
+            reply(Answer(message.number, False, "gaze/look_at rejected the goal; gaze/goal has not said why"))
+        if self._reasons is not None and not self._unexplained:
+            self._node.destroy_subscription(self._reasons)
+            self._reasons = None
         if self._goals and not self._look_at.server_is_ready():
             for _, message, reply in self._goals.values():
                 reply(Answer(message.number, False, f"{_GAZE} has gone: the goal has no result"))
@@ -103,12 +115,19 @@ class HeadCommands:
                 handle.cancel_goal_async()
             return
         if not handle.accepted:
-            reply(Answer(message.number, False, "gaze/look_at refused the goal"))
+            self._unexplained.append((monotonic() + _REASON_WITHIN_S, message, reply))
+            if self._reasons is None:  # the reason is latched
+                self._reasons = self._node.create_subscription(GazeGoal, "gaze/goal", self._on_goal, _LATCHED)
             return
         self._goals[number] = (handle, message, reply)
         reply(Answer(message.number, True, "the goal is accepted", last=False))
         ended = answering(self._node, message, reply, partial(self._on_result, number))
         handle.get_result_async().add_done_callback(ended)
+
+    def _on_goal(self, report: GazeGoal) -> None:
+        if report.state == GazeGoal.REJECTED and self._unexplained:
+            _, message, reply = self._unexplained.popleft()
+            reply(Answer(message.number, False, f"{_result_name(report.result)}: {report.reason}"))
 
     def _on_result(self, number: int, future: Any) -> None:
         _, message, reply = self._goals.pop(number, (None, None, None))

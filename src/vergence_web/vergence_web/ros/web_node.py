@@ -26,7 +26,7 @@ from vergence_web.server_thread import ServerThread
 from vergence_web.update import Part
 from vergence_web.viewers import Viewers
 
-_CHECK_S = 1.0
+_CHECK_S, _BEGIN_S = 1.0, 0.02
 
 
 class WebNode(Node):
@@ -51,6 +51,8 @@ class WebNode(Node):
         self._thread = ServerThread(self._page.app, values.address, values.port)
         self._settings.on_change(self._on_settings)
         self._diagnostics.add("page", self._report)
+        # A page may come before this node is spun.
+        self._begin = self.create_timer(_BEGIN_S, self._on_spun, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.urls = page_urls(values.address, self._thread.port, token, own_addresses())
         """Where the page can be opened, with its token."""
         for url in self.urls:
@@ -80,6 +82,10 @@ class WebNode(Node):
         self._calls.append(call)
         if self.executor is not None:  # rclpy's events executor has tasks, but no guard conditions
             self.executor.create_task(self._run_calls)
+
+    def _on_spun(self) -> None:
+        self.destroy_timer(self._begin)
+        self._run_calls()
 
     def _run_calls(self) -> None:
         while self._calls:

@@ -38,7 +38,7 @@ export class HeadView {
   zoom(head) {
     const far = [head.fixation, head.target].filter((point) => point && !point.includes(null)).map((point) => Math.hypot(...point));
     const wanted = Math.min(Math.max(1.25 * Math.max(0, ...far), NEAREST_M), FARTHEST_M);
-    this.span *= (wanted / this.span) ** 0.2;
+    this.span *= (wanted / this.span) ** 0.35;
   }
 
   drawEye(context, head, i, stroke, at, scale) {

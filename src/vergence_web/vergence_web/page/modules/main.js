@@ -12,6 +12,7 @@ import { Words } from "./words.js";
 
 const EYES = ["left", "right"];
 const SAME_CLOCK_S = 60;
+const CHART_PERIOD_S = 0.18;
 
 const link = new Link(onUpdate, onStatus);
 const control = new Control(link);
@@ -24,7 +25,7 @@ const details = new Details();
 new Parameters(link);
 
 // For tests and measurements: what the page has done so far.
-const figures = { updates: 0, latencies: [], images: { left: 0, right: 0, edges: 0 }, samples: 0, control };
+const figures = { updates: 0, latencies: [], images: { left: 0, right: 0, edges: 0 }, samples: 0, chartsAt: 0, control };
 window.vergence = figures;
 
 function showEdges(edges) {
@@ -47,21 +48,25 @@ async function onUpdate(update) {
       eyes.setImage(image.name, bitmaps[i], image.stamp);
       figures.images[image.name] += 1;
     });
+    if (update.state) eyes.setState(update.state);
+    if (update.images.length || update.state) eyes.draw();
     if (update.state) showState(update.state, now);
     if (update.slow) showSlow(update.slow);
     if (update.available) control.setAvailable(update.available);
-    if (update.images.length || update.state) eyes.draw();
     figures.updates += 1;
     link.drawn(update.number, latency(update.images));
   });
 }
 
+/** Pictures before texts: a canvas's size is asked for, and after a change of texts that needs a new layout. */
 function showState(state, now) {
-  eyes.setState(state);
-  words.show(state);
   charts.add(state, now);
-  charts.draw(now);
-  head.draw(state);
+  if (now - figures.chartsAt > CHART_PERIOD_S) {
+    figures.chartsAt = now;
+    charts.draw(now);
+    head.draw(state);
+  }
+  words.show(state);
   figures.samples += 1;
   figures.state = state;
 }
@@ -72,13 +77,13 @@ function showSlow(slow) {
   figures.slow = slow;
 }
 
-/** The time [s] from the newest eye's stamp to now; NaN where the stamps are of another clock. */
+/** The time [s] from the left image's stamp, or the right one's where it is alone, to now; NaN for another clock's. */
 function latency(images) {
-  const stamps = images.filter((image) => EYES.includes(image.name)).map((image) => Number(image.stamp) / 1e6);
-  if (!stamps.length) return NaN;
-  const seconds = (performance.timeOrigin + performance.now() - Math.max(...stamps)) / 1000;
+  const image = EYES.map((eye) => images.find((one) => one.name === eye)).find(Boolean);
+  if (!image) return NaN;
+  const seconds = (performance.timeOrigin + performance.now() - Number(image.stamp) / 1e6) / 1000;
   if (Math.abs(seconds) > SAME_CLOCK_S) return NaN;
   details.latency = seconds;
-  figures.latencies = [...figures.latencies.slice(-999), { stamp: String(images[0].stamp), seconds }];
+  figures.latencies = [...figures.latencies.slice(-999), { eye: image.name, stamp: image.stamp, seconds }];
   return seconds;
 }

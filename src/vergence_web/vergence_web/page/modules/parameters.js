@@ -52,7 +52,7 @@ export class Parameters {
     if (one.kind === "int" || one.kind === "float") input.inputMode = "decimal";
     const said = make("div", { class: "said" });
     input.addEventListener("change", () => this.set(one, input, said));
-    const about = [one.description, one.allowed, one.read_only ? "fixed at the start" : ""].filter(Boolean).join(". ");
+    const about = [one.description, one.allowed, one.read_only ? "fixed at the start" : ""].filter(Boolean).join("; ");
     return make("div", { class: "parameter", "data-parameter": one.name }, make("div", { class: "line" }, make("span", { class: "name" }, one.name), input), make("div", { class: "about" }, about), said);
   }
 
