@@ -5,7 +5,6 @@ from functools import partial
 from time import monotonic_ns
 from typing import Any
 
-from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from sensor_msgs.msg import CompressedImage
 
@@ -28,7 +27,7 @@ class StoredImages:
         """True if both cameras hand out their images."""
         return all(client.service_is_ready() for client in self._clients)
 
-    def get(self, stamp: Time, on_pair: Callable[[ImagePair | None], None]) -> None:
+    def get(self, stamp: Any, on_pair: Callable[[ImagePair | None], None]) -> None:
         """Call `on_pair`, in the executor's thread, with the images nearest to a stamp, or None if there are none."""
         answers: list[ImageFrame | None] = [None, None]
         waiting = {LEFT, RIGHT}
