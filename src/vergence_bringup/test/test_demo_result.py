@@ -12,6 +12,7 @@ from vergence_bringup.demo.report import write_report
 from vergence_bringup.demo.result import MetricTable, Series, StationResult, summary, table, unfinished, write_summary
 from vergence_bringup.demo.stations import cube_held, marker_80_80, stations
 from vergence_bringup.figures.boxes import BoxFigures
+from vergence_bringup.figures.pictures import read_image
 
 SETTINGS = {"servo": "sg90", "cameras": "realistic", "duration_s": 1.0}
 
@@ -194,7 +195,7 @@ def test_the_report_opens_with_one_picture_of_every_station(result, tmp_path):
         (tmp_path / "pictures").mkdir(exist_ok=True)
         cv2.imwrite(str(tmp_path / "pictures" / f"cube_{part}.{suffix}"), np.full((240, 320, 3), 90, np.uint8))
     write_report(tmp_path / "report.html", [result, other], SETTINGS, tmp_path)
-    picture = cv2.imread(str(tmp_path / "pictures" / "overview.png"))
+    picture = read_image(tmp_path / "pictures" / "overview.png")
     left, right = np.hsplit(picture, 2)
     assert (left[30:190, :180] == 90).all()
     assert (right[30:] == 255).all()  # the other station has no pictures
