@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from bench.budget_recording import record
-from bench.budget_run import UNHEARD_S, HeadCommand, Share, cameras, measure
+from bench.budget_run import IDLE_S, HeadCommand, Share, cameras, measure
 from bench.photos_data import NoPhotographsError
 from bench.results import Row
 from vergence_bringup.ros.processes import NodeCommand
@@ -40,10 +40,11 @@ def run(say: Callable[[str], None]) -> list[Row]:
             ("metric", "controller", "servo"),
             goal=True,
         )
-        say("nothing asks for anything: cameras, edge metric, servos")
-        idle = measure(eyes | servo | {"edge_metric_node": NodeCommand.of("edge_metric_node")}, settled_s=UNHEARD_S)
-        say("the loop in one process")
+        say("no goal, and nothing else reads anything: the same nodes")
+        idle = measure(eyes | servo | {name: NodeCommand.of(name) for name in LOOP[:2]}, settled_s=IDLE_S)
+        say("the loop in one process, with and without a goal")
         composed = measure({"head_node": HeadCommand(folders)}, goal=True)
+        composed_idle = measure({"head_node": HeadCommand(folders)}, settled_s=IDLE_S)
     kinds = dict.fromkeys(("edge_metric_node", "box_metric_node", "eye_rotation_node"), "metric")
     kinds |= {"gaze_controller_node": "controller", "servo_node": "servo"}
     shares = alone | loop
@@ -63,7 +64,9 @@ def run(say: Callable[[str], None]) -> list[Row]:
         Row("budget.composed.rss_mb", composed["head_node"].rss_mb, "MB", "a process for each node", _memory(loop))
     )
     rows.append(Row("budget.separate.core_share", separate, "of a core"))
-    rows.append(Row("budget.idle.core_share", _total(idle), "of a core"))
+    rows.append(
+        Row("budget.idle.core_share", _total(idle), "of a core", "the same in one process", _total(composed_idle))
+    )
     return rows
 
 

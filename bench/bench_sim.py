@@ -1,4 +1,7 @@
-"""Cost of a simulated pair, and speed of the lockstep simulator relative to real time."""
+"""Cost of a simulated pair, of eyes that turn and of eyes at rest, and speed of the simulator in lockstep.
+
+While nothing moves the view is not drawn anew: the noise and the JPEG of each image are.
+"""
 
 import time
 from collections.abc import Callable
@@ -24,9 +27,10 @@ def run(say: Callable[[str], None]) -> list[Row]:
     rows.append(Row("sim.start_s", time.perf_counter() - began_s, "s for two rooms"))
     with closing(realistic), closing(ideal):
         say(f"{_PAIRS} pairs with realistic and with ideal cameras")
-        pair_ms, ideal_ms = _pair_ms(realistic), _pair_ms(ideal)
+        pair_ms, ideal_ms = _pair_ms(realistic, turning=True), _pair_ms(ideal, turning=True)
         for name in ("sim.pair_ms", "sim.render_pair_ms"):
             rows.append(Row(name, pair_ms, "ms CPU", "ideal cameras, rendering alone", ideal_ms))
+        rows.append(Row("sim.pair_ms.at_rest", _pair_ms(realistic, turning=False), "ms CPU"))
         began_s, sim_began_s = time.perf_counter(), realistic.time_s
         _follow(realistic, _PAIRS)
         factor = (realistic.time_s - sim_began_s) / (time.perf_counter() - began_s)
@@ -40,9 +44,11 @@ def run(say: Callable[[str], None]) -> list[Row]:
     return rows
 
 
-def _pair_ms(simulator: Simulator) -> float:
+def _pair_ms(simulator: Simulator, turning: bool) -> float:
     costs_ms = []
-    for _ in range(_PAIRS):
+    for number in range(_PAIRS):
+        if turning:
+            simulator.set_head({"pan_left": 0.1 * np.sin(number / 20), "pan_right": 0.1 * np.sin(number / 20)})
         simulator.advance(_FRAME_S)
         began_s = time.process_time()
         simulator.view("left")

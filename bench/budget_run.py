@@ -15,7 +15,7 @@ from vergence_bringup.ros.processes import Command, NodeCommand, ProcessGroup, e
 from vergence_common.domains import own_domain
 
 SETTLED_S = 12.0
-UNHEARD_S = 45.0  # after which metric nodes without subscribers receive nothing
+IDLE_S = 25.0  # after which a head without a goal measures and receives nothing
 MEASURED_S = 15.0
 _STARTED_S = 5.0
 

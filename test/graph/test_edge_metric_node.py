@@ -93,6 +93,8 @@ def answers(graph: Any, eyes: Eyes, left: Pixels, right: Pixels, skew_ns: int = 
 def node(graph: Any) -> EdgeMetricNode:
     node: EdgeMetricNode = graph.start(EdgeMetricNode)
     graph.node_matched = lambda: node._track_publisher.get_subscription_count() > 0
+    graph.client.create_subscription(TargetTrack, "vergence/track", lambda _: None, 10)
+    graph.wait_until(graph.node_matched, "the track is read: without readers nothing is measured")
     return node
 
 
@@ -390,7 +392,7 @@ def test_a_request_is_answered_with_its_goals_id(graph: Any, node: EdgeMetricNod
     wanted = TrackRequest(goal_id=9, eye=TrackRequest.EYE_LEFT, x_px=100.0, y_px=80.0)
     wanted.header.stamp = from_nanoseconds(eyes.stamp_ns)
     requests.publish(wanted)
-    graph.wait_until(lambda: node._measurement._requests, "the request has arrived")
+    graph.wait_until(lambda: node._requests, "the request has arrived")
     publish_joints()
     *_, track = answers(graph, eyes, view(0), view(6))
     assert (track.goal_id, track.status) == (9, TargetTrack.STATUS_OK), track.reason

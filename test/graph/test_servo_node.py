@@ -28,6 +28,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from vergence_common.stamps import to_stamp
 from vergence_rig.parameters import ParameterError
 from vergence_servo.drivers.protocol import ChannelError, DriverUnavailableError
+from vergence_servo.ros import servo_node
 from vergence_servo.ros.servo_node import ServoNode
 from vergence_servo.testing.pigpio_daemon import PigpioDaemon
 
@@ -381,3 +382,23 @@ def test_a_pi_4_drives_the_pans_by_kernel_pwm_and_the_tilt_by_another_backend(
 def test_a_third_servo_on_two_channels_is_refused_with_the_way_out(make_graph: Callable[..., Graph]):
     with pytest.raises(ChannelError, match=r"channel must be 0 to 1: got 2.*another backend in servos\.yaml"):
         make_graph(pwm_channels=2)
+
+
+def test_joint_states_come_less_often_while_nothing_moves_and_the_pose_before_a_motion_at_once(
+    make_graph: Callable[..., Graph], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(servo_node, "_RESTING_AFTER_S", 0.0)
+    graph = make_graph()
+    node = graph.node
+    assert node is not None
+    graph.until(node._updates.is_canceled)
+    assert node._reports.timer_period_ns == 100_000_000
+    graph.states.clear()
+    graph.command(pan_left=0.3)
+    graph.until(lambda: not node._updates.is_canceled())
+    graph.until(lambda: bool(graph.states))
+    assert node._reports.timer_period_ns == 20_000_000
+    assert graph.states[-1].position[0] < 0.3
+    graph.drive(pan_left=0.3)
+    graph.until(lambda: graph.states[-1].position[0] == pytest.approx(0.3, abs=1e-3))
+    graph.until(node._updates.is_canceled)

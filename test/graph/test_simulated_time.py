@@ -18,7 +18,7 @@ from vergence_msgs.msg import GazeState, TargetTrack
 from vergence_rig.rig import default_rig
 from vergence_sim.optics import Lens
 from vergence_sim.parameters import NODE_GROUPS, SimParameters
-from vergence_sim.ros.real_time_node import RealTimeNode
+from vergence_sim.ros.world_node import WorldNode
 from vergence_sim.world import EYES
 
 pytestmark = pytest.mark.graph
@@ -60,7 +60,7 @@ class Blank:
         pass
 
 
-class BlankNode(RealTimeNode):
+class BlankNode(WorldNode):
     """The simulator's node with a blank world."""
 
     def __init__(self, **options: Any) -> None:

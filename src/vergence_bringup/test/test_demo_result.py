@@ -12,6 +12,7 @@ from vergence_bringup.demo.report import write_report
 from vergence_bringup.demo.result import MetricTable, Series, StationResult, summary, table, unfinished, write_summary
 from vergence_bringup.demo.stations import cube_held, marker_80_80, stations
 from vergence_bringup.figures.boxes import BoxFigures
+from vergence_bringup.figures.pictures import read_image
 
 SETTINGS = {"servo": "sg90", "cameras": "realistic", "duration_s": 1.0}
 
@@ -135,7 +136,7 @@ def test_report_carries_its_pictures_and_plots(result, boxes, tmp_path):
             cv2.imwrite(str(pictures / f"cube_{moment}_{kind}"), np.zeros((8, 8, 3), np.uint8))
     write_report(tmp_path / "report.html", [dataclasses.replace(result, end_box=boxes)], SETTINGS, tmp_path)
     text = (tmp_path / "report.html").read_text()
-    assert text.count("data:image/") == 10
+    assert text.count("data:image/") == 11  # the overview and each picture
     assert text.count("<svg") == 3
     assert text.count("<polyline") >= 8
     assert "end, left &minus; right [px]</td><td>-</td><td>+2.00</td><td>+12.00</td>" in text
@@ -186,3 +187,24 @@ def test_the_marker_station_is_the_papers_80_degrees():
     station = marker_80_80()
     assert station.start_vergence_deg == pytest.approx(180 - 2 * 80)
     assert station.place_m is None
+
+
+def test_the_report_opens_with_one_picture_of_every_station(result, tmp_path):
+    other = dataclasses.replace(result, name="other", reported_verged=False)
+    for part, suffix in (("end_left", "jpg"), ("start_combined", "png"), ("end_combined", "png")):
+        (tmp_path / "pictures").mkdir(exist_ok=True)
+        cv2.imwrite(str(tmp_path / "pictures" / f"cube_{part}.{suffix}"), np.full((240, 320, 3), 90, np.uint8))
+    write_report(tmp_path / "report.html", [result, other], SETTINGS, tmp_path)
+    picture = read_image(tmp_path / "pictures" / "overview.png")
+    left, right = np.hsplit(picture, 2)
+    assert (left[30:190, :180] == 90).all()
+    assert (right[30:] == 255).all()  # the other station has no pictures
+    assert (right[:20] != 255).any()  # but a verdict
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.index("<img") < page.index("<table")
+
+
+def test_without_pictures_the_report_has_no_overview(result, tmp_path):
+    write_report(tmp_path / "report.html", [result], SETTINGS, tmp_path)
+    assert not (tmp_path / "pictures").exists()
+    assert "<img" not in (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -35,6 +35,11 @@ class LocalImages:
         """Call `receiver` with each image of a topic that is offered."""
         self._receivers[topic].append(receiver)
 
+    def remove(self, topic: str, receiver: Receive) -> None:
+        """Call `receiver` with no further image of a topic."""
+        with self.lock:
+            self._receivers[topic].remove(receiver)
+
     def wanted(self, topic: str) -> bool:
         """Return whether a topic's images have a receiver."""
         return bool(self._receivers.get(topic))

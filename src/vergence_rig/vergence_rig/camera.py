@@ -99,6 +99,20 @@ class CameraModel:
             normalised[~(np.abs(self._distort(normalised) - distorted).max(axis=1) < 1e-6)] = np.nan
         return normalised
 
+    def undistorted(self, u_px: float, v_px: float) -> tuple[float, float]:
+        """Return what `undistort` does of one pixel: without distortion without the cost of arrays."""
+        if self._is_distorted:
+            x, y = self.undistort((u_px, v_px))[0].tolist()
+            return x, y
+        return (float(u_px) - self.cx_px) / self.fx_px, (float(v_px) - self.cy_px) / self.fy_px
+
+    def distorted(self, x: float, y: float) -> tuple[float, float]:
+        """Return what `distort` does of one point, as `undistorted`."""
+        if self._is_distorted:
+            u_px, v_px = self.distort((x, y))[0].tolist()
+            return u_px, v_px
+        return x * self.fx_px + self.cx_px, y * self.fy_px + self.cy_px
+
     def distort(self, normalised: Any) -> Array:
         """Return raw pixels (N, 2) of normalised coordinates (N, 2). NaN beyond the lens model's monotone range."""
         points = np.atleast_2d(np.asarray(normalised, dtype=np.float64))

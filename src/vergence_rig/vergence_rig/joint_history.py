@@ -54,8 +54,11 @@ class JointHistory:
         stamp that runs back means that the clock was set: the history starts again with this state.
         """
         found = dict(zip(names, positions_rad, strict=False))
-        angles = [float(found.get(name, math.nan)) for name in JOINT_NAMES]
-        if not all(math.isfinite(angle) for angle in angles):
+        return self.add_angles(stamp, np.array([found.get(name, math.nan) for name in JOINT_NAMES], np.float64))
+
+    def add_angles(self, stamp: float, angles_rad: Array) -> bool:
+        """Add the angles (3,) of all joints, in the order of JOINT_NAMES, which must not be changed; see `add`."""
+        if not all(map(math.isfinite, angles_rad.tolist())):
             return False
         stamps, samples = self._kept
         if stamps and stamp <= stamps[-1]:
@@ -63,7 +66,7 @@ class JointHistory:
                 return False
             stamps, samples = [], []
         first = max(bisect_left(stamps, stamp - self._keep), len(stamps) + 1 - _LARGEST_COUNT)
-        self._kept = ([*stamps[first:], stamp], [*samples[first:], JointSample(stamp, np.array(angles))])
+        self._kept = ([*stamps[first:], stamp], [*samples[first:], JointSample(stamp, angles_rad)])
         return True
 
     def clear(self) -> None:

@@ -56,7 +56,12 @@ class ServoNodeParameters(HeadParameters):
         100.0, "rate at which pulses are sent along a motion", unit="Hz", minimum=10, maximum=1000, read_only=True
     )
     state_rate_hz: float = parameter(
-        50.0, "rate at which joint_states is published", unit="Hz", minimum=1, maximum=500, read_only=True
+        50.0,
+        "rate at which joint_states is published; at most 10 Hz while no servo has been commanded or moved for 1 s",
+        unit="Hz",
+        minimum=1,
+        maximum=500,
+        read_only=True,
     )
     command_max_age_s: float = parameter(
         0.5,

@@ -191,6 +191,11 @@ class ServoHead:
         return all(channel.state is ChannelState.FAILED or channel.arrived(wanted) for channel, wanted in commanded)
 
     @property
+    def moving(self) -> bool:
+        """True while commands, a trajectory or parking may change what is sent from one step to the next."""
+        return self.mode in (Mode.COMMANDED, Mode.PARKING)
+
+    @property
     def pulsing(self) -> bool:
         """True if any servo gets pulses."""
         return any(channel.state is ChannelState.PULSING for channel in self.channels.values())

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from vergence_rig.rig import CameraSpec
 from vergence_sim.camera_parameters import RightCameraParameters
+from vergence_sim.memory import return_free_memory
 from vergence_sim.parameters import SimParameters
 
 Image = npt.NDArray[np.uint8]
@@ -124,6 +125,7 @@ class Sensor:
             again.bit_generator.state = self._before_noise
             self._noise = [_parts(field * sigma) for field in _fields(again, self._shape)]
             self._noise_sigma = sigma
+            return_free_memory()
         # A new field for every frame would cost more than rendering: take a random one at a random shift.
         brighter, darker = self._noise[int(self._rng.integers(_NOISE_BANK))]
         row = int(self._rng.integers(image.shape[0]))

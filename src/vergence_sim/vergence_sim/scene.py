@@ -10,7 +10,7 @@ import numpy as np
 from vergence_rig.head_bodies import BASE, CAMERAS, EYES
 from vergence_rig.head_mjcf import camera_mjcf, mjcf_bodies
 from vergence_rig.rig import Rig
-from vergence_sim.memory import return_free_memory
+from vergence_sim.memory import discard_pages, return_free_memory
 from vergence_sim.model_builder import FACES, HIDDEN_GROUP, ModelBuilder
 from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.persons import BOARD_HALF_M, PERSONS
@@ -229,6 +229,12 @@ def _compiled(
     model = builder.compile(width_px, height_px, light)
     return_free_memory()
     return model
+
+
+def release_textures(model: mujoco.MjModel) -> None:
+    """Free the memory of a model's textures once OpenGL has copies of them; no further renderer can be made of it."""
+    _compiled.cache_clear()  # what is built next has textures again
+    discard_pages(model.tex_data)
 
 
 def build_scene(

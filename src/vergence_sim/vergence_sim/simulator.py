@@ -17,7 +17,7 @@ from vergence_sim.optics import Lens, Sensor, motion_blurred
 from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.persons import PERSONS, person_place_m
 from vergence_sim.renderer import EyeRenderer
-from vergence_sim.scene import OBJECTS, STAND, build_scene
+from vergence_sim.scene import OBJECTS, STAND, build_scene, release_textures
 from vergence_sim.truth import GroundTruth, TrueBox, Truth
 
 Array = npt.NDArray[np.float64]
@@ -52,6 +52,7 @@ class Simulator:
         rig: Rig | None = None,
         render: bool = True,
         head: Rig | None = None,
+        alone: bool = False,
     ) -> None:
         """Make the head and its room.
 
@@ -60,6 +61,7 @@ class Simulator:
             rig: that a driver and the other nodes are given; the built-in one if none.
             render: False for no images.
             head: the head that is simulated, as a rig of its own; the parameters' if none.
+            alone: True if this process makes no other simulator: memory that others would share is freed.
         """
         self.parameters = (parameters or SimParameters()).effective()
         simulation, self.rig = self.parameters.simulation, rig or default_rig()
@@ -75,6 +77,8 @@ class Simulator:
         self._truth = GroundTruth(self._model, self._data, self.lenses, built)
         sizes_px = {eye: (camera.width_px, camera.height_px) for eye, camera in cameras.items()}
         self._renderer = EyeRenderer(self._model, sizes_px) if render else None
+        if render and alone:
+            release_textures(self._model)
         seeds = np.random.SeedSequence(simulation.seed).spawn(2)
         self._sensors = (
             {
@@ -84,6 +88,7 @@ class Simulator:
             if render
             else {}
         )
+        self._projected: dict[str, tuple[Image, Image]] = {}
         self._yaw_rad = 0.0
         start = self.parameters.target
         self._places: dict[str, Array] = {
@@ -169,9 +174,18 @@ class Simulator:
 
         def image() -> Image:
             blurred = motion_blurred(view, motion_px) if parameters.camera.exposure_s > 0 else view
-            return self._sensors[eye].apply(self.lenses[eye].apply(blurred), parameters)
+            projected = self._through_lens(eye, blurred)
+            taken = self._sensors[eye].apply(projected, parameters)
+            return taken.copy() if taken is projected else taken
 
         return image
+
+    def _through_lens(self, eye: str, view: Image) -> Image:
+        """Return a view through the lens; the same array again for the view before, as long as nothing moves."""
+        before = self._projected.get(eye)
+        if before is None or before[0] is not view:
+            before = self._projected[eye] = view, self.lenses[eye].apply(view)
+        return before[1]
 
     def capture(self, skew_s: float | None = None) -> StereoFrame:
         """Return the next pair, the first of the two exposed now, with the truth at the left exposure.

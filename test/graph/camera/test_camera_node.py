@@ -18,6 +18,7 @@ from vergence_camera.ros.camera_node import CameraNode
 from vergence_camera.testing.fake_machine import FakeMachine
 from vergence_common.images import image_to_array
 from vergence_common.stamps import from_nanoseconds, to_nanoseconds
+from vergence_msgs.srv import GetStoredImage
 from vergence_rig.parameters import ParameterError
 
 pytestmark = pytest.mark.graph
@@ -228,3 +229,23 @@ def test_frames_that_are_all_too_old_are_no_healthy_stream(
     status = graph.diagnostic("camera_node: camera", lambda s: "no image is published" in s.message)
     assert status.level == DiagnosticStatus.ERROR
     assert "frames are older than max_age_s" in status.message
+
+
+def test_an_image_of_the_last_second_can_be_had_without_receiving_any(
+    graph: Any, machine: FakeMachine, start: Callable[..., CameraNode], jpeg: Any
+) -> None:
+    camera = machine.plug_in(0, serial="AAA")
+    node = start()
+    pictures = [jpeg(number) for number in range(4)]
+    for number, picture in enumerate(pictures):
+        graph.wait_until(lambda n=number: len(node._stored._kept) == n, "the frame before is stored")
+        camera.push(picture, time.monotonic_ns())
+        time.sleep(0.02)  # stamps that differ by more than what they are corrected by
+    graph.wait_until(lambda: len(node._stored._kept) == len(pictures), "all are stored")
+    client = graph.client.create_client(GetStoredImage, "left/get_stored_image")
+    graph.wait_until(client.service_is_ready, "the service")
+    for (stamp_ns, _), picture in zip(list(node._stored._kept), pictures, strict=True):
+        answer = graph.wait(client.call_async(GetStoredImage.Request(stamp=from_nanoseconds(stamp_ns + MS))))
+        assert answer.found
+        assert to_nanoseconds(answer.header.stamp) == stamp_ns
+        assert bytes(answer.jpeg) == picture

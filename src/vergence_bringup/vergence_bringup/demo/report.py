@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from vergence_bringup.demo import photo_report
+from vergence_bringup.demo import overview, photo_report
 from vergence_bringup.demo.result import Series, StationResult, duration_text, verdict_line
 from vergence_bringup.figures.boxes import CORNERS, signed
 from vergence_bringup.figures.svg_plot import Line, plot
@@ -36,6 +36,8 @@ def write_report(path: Path, results: Sequence[StationResult], settings: dict[st
         f"Servos: {html.escape(str(settings['servo']))}, cameras: {html.escape(str(settings['cameras']))}, "
         f"{duration_text(settings)}.</p>",
     ]
+    if overview.write_overview(results, out_dir / "pictures"):
+        parts.append(_figure(out_dir / "pictures" / overview.FILE, overview.CAPTION))
     if "photographs" in settings:
         parts += [photo_report.introduction(settings["photographs"]), _photographs(out_dir / "pictures")]
     parts.append(_overview(results))

@@ -22,6 +22,7 @@ from vergence_camera.ros.calibration_service import CalibrationService
 from vergence_camera.ros.camera_controls import PREFIX, CameraControls
 from vergence_camera.ros.camera_messages import JpegSerializer
 from vergence_camera.ros.partner import PartnerCamera
+from vergence_camera.ros.stored_images import StoredImages
 from vergence_camera.source_choice import SourceOptions, make_source, shown_choice
 from vergence_camera.stamps import Stamp, Stamper
 from vergence_camera.v4l2.kernel import Kernel
@@ -74,6 +75,7 @@ class CameraNode(Node):
         )
         self._compressed, self._info, self._raw = self._publishers_of_frames
         self._calibration = CalibrationService(self, settings.camera_info_url, settings.camera_name or eye or "camera")
+        self._stored = StoredImages(self, self._frame_id, self._jpeg)
         self._partner: PartnerCamera | None = None
         if settings.partner:
             self._partner = PartnerCamera(
@@ -117,6 +119,7 @@ class CameraNode(Node):
         """Publish one frame, in the capture thread; each form only if it has subscribers."""
         began_ns = time.monotonic_ns()
         try:
+            self._stored.add(stamp.ros_ns, frame)
             jpeg_wanted, info_wanted, raw_wanted = self._wanted
             if jpeg_wanted:
                 self._compressed.publish(self._serialise(self._jpeg(frame), stamp.ros_ns))

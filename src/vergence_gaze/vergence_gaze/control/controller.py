@@ -111,6 +111,11 @@ class GazeController:
         return pulse_steps_rad(self._described)
 
     @property
+    def uses_images(self) -> bool:
+        """True while what the images show turns the eyes, or may: not while they hold still or go to an angle."""
+        return (self._active and self._pose is None) or self._attention.policy != DISABLED
+
+    @property
     def kinematics(self) -> Kinematics:
         """Those of the head as it is described now."""
         return self._perception.kinematics
@@ -150,7 +155,7 @@ class GazeController:
         self._goal_speed_rad_s, slow_s = self._pace(goal, request)
         self._goals.start(goal_id, goal, now_s, self._p, slow_s)
         self._feedback.retry()
-        self._active, self._pose, self._verges_on_sight = True, None, False
+        self._activate(now_s)
         self._perception.judge.restart()
         self._law.reset()
         self._searcher.stop()
@@ -237,7 +242,8 @@ class GazeController:
         elif self._attention.policy != DISABLED:
             self._attention.resume()
         elif not self._active:
-            self._active = self._verges_on_sight = True
+            self._activate(now_s)
+            self._verges_on_sight = True
             self._perception.tracking.clear()
             self._free_requests()
 
@@ -245,6 +251,42 @@ class GazeController:
         """Update by what arrived since the last cycle and return what to command now.
 
         `joint_fault` says why no usable joint_states arrive, as whoever reads them reports it; empty while they do.
+        """
+        self.observe(observations, now_s)
+        sending = self._enabled and (self._active or now_s < self._send_until_s)
+        last_sent, history = (self._command if sending else None), self._perception.history
+        if not math.isfinite(now_s):
+            return Command(None, self._report(now_s), self._goals.pop_outcomes())
+        fault = self._feedback.update(now_s, history, last_sent, self._driven, joint_fault)
+        self._goals.update_feedback(fault, now_s, self._p)
+        if not history.known:
+            return Command(None, self._report(now_s), self._goals.pop_outcomes())
+        command = self._command
+        if command is None or not sending:
+            command = self._start_from_joints(now_s)
+        if not self._fault(now_s):
+            self._attend(now_s)
+        desired = self._decide(now_s, command) if self._active else self._rest
+        elapsed_s = now_s - self._command_s
+        sent = self._present_limits.limited(desired, command, elapsed_s, history.reported_rad, self._speed_rad_s)
+        self._note_limits(desired)
+        self._command, self._command_s = sent, max(now_s, self._command_s)
+        if sending:
+            self._perception.history.on_command(now_s, sent)
+        if not fault:
+            self._update_goal(now_s)
+        joints_rad = np.array(self._described.joint_angles(sent.tolist())) if sending else None
+        outcomes, requests = self._goals.pop_outcomes(), self._requests
+        return Command(joints_rad, self._report(now_s), outcomes, requests.pop(), requests.pop_object())
+
+    def rests(self, now_s: float) -> bool:
+        """Return whether a step would command nothing and end no goal: `observe` is then enough in most cycles."""
+        busy = self._active or now_s < self._send_until_s or self._goals.has_outcomes
+        return not busy and self._attention.policy == DISABLED
+
+    def observe(self, observations: Iterable[Observation], now_s: float) -> None:
+        """Update by what has arrived, as `step` does.
+
         If the clock runs back by more than a second, the eyes hold still and everything starts again.
         """
         if now_s < self._command_s - _CLOCK_JUMP_S:
@@ -255,36 +297,14 @@ class GazeController:
             self._restart("the clock was set back", self._p, now_s)
         for observation in observations:
             self._observe(observation, now_s)
-        sending = self._enabled and (self._active or now_s < self._send_until_s)
-        last_sent, history = (self._command if sending else None), self._perception.history
-        if not math.isfinite(now_s):
-            return Command(None, self._report(now_s), self._goals.pop_outcomes())
-        fault = self._feedback.update(now_s, history, last_sent, self._driven, joint_fault)
-        self._goals.update_feedback(fault, now_s, self._p)
-        if not history.known:
-            return Command(None, self._report(now_s), self._goals.pop_outcomes())
-        if self._command is None or not sending:
-            # While idle, others may move the joints: start from where they are.
-            self._command, self._command_s = self._limits.nearest(self._perception.history.reported_rad), now_s
-        if not self._fault(now_s):
-            self._attend(now_s)
-        desired = self._decide(now_s, self._command) if self._active else self._rest
-        sent = self._present_limits.limited(
-            desired,
-            self._command,
-            now_s - self._command_s,
-            self._perception.history.reported_rad,
-            self._speed_rad_s,
-        )
-        self._note_limits(desired)
-        self._command, self._command_s = sent, max(now_s, self._command_s)
-        if sending:
-            self._perception.history.on_command(now_s, sent)
-        if not fault:
-            self._update_goal(now_s)
-        joints_rad = np.array(self._described.joint_angles(sent.tolist())) if sending else None
-        outcomes, requests = self._goals.pop_outcomes(), self._requests
-        return Command(joints_rad, self._report(now_s), outcomes, requests.pop(), requests.pop_object())
+        if self._perception.history.known and self.rests(now_s):
+            self._start_from_joints(now_s)
+
+    def _start_from_joints(self, now_s: float) -> Array:
+        """Start the next command from where the joints are (3,): while none is sent, others may move them."""
+        self._command = command = self._limits.nearest(self._perception.history.reported_rad)
+        self._command_s = now_s
+        return command
 
     @property
     def _present_limits(self) -> CommandLimits:
@@ -298,7 +318,7 @@ class GazeController:
         searching = self._phases.phase is Phase.SEARCH
         if not attention.update(now_s, asked, searching, self._enabled, self._perception.judge.verged):
             return
-        self._active, self._pose, self._verges_on_sight = True, None, False
+        self._activate(now_s)
         focus = attention.focus
         if focus is None:
             tracking.clear()
@@ -362,7 +382,7 @@ class GazeController:
             self._perception.tracking.request_stream()
             self._free_requests()
             self._perception.judge.restart("the target is a stream of points")
-            self._active, self._pose, self._verges_on_sight = True, None, False
+            self._activate(now_s)
 
     def _decide(self, now_s: float, command: Array) -> Array:
         """Return the desired joint angles (3,), NaN for joints that stay."""
@@ -492,6 +512,10 @@ class GazeController:
         self._configure(parameters)
         self._hold(reason, now_s)
 
+    def _activate(self, now_s: float) -> None:
+        self._active, self._pose, self._verges_on_sight = True, None, False
+        self._perception.expect_images(now_s)
+
     def _hold(self, reason: str, now_s: float) -> None:
         self._active, self._pose, self._verges_on_sight = False, None, False
         self._perception.tracking.clear()
@@ -506,8 +530,9 @@ class GazeController:
 
     def _report(self, now_s: float) -> GazeReport:
         law, mode = self._law.name, self._p.control.mode
-        attention = self._attention.describe()
-        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, self._fault(now_s), attention)
+        attention, needed = self._attention.describe(), self.uses_images
+        fault = self._fault(now_s)
+        return make_report(now_s, self._perception, self._phases, law, mode, self._rig, fault, attention, needed)
 
 
 def _driven(parameters: GazeParameters) -> npt.NDArray[np.bool_]:

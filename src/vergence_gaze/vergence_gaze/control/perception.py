@@ -1,6 +1,9 @@
 """The controller's state estimate: observations in; joints, target and `verged` out. It commands nothing."""
 
 import math
+from collections.abc import Callable
+from copy import copy
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -79,6 +82,11 @@ class Perception:
         coarser = np.maximum(pulse_steps_rad(rig) - self._described_steps_rad, 0.0)
         self._unresolved_rad = 0.5 * float(coarser[0] + coarser[1])
 
+    def expect_images(self, now_s: float) -> None:
+        """Begin to wait for results of images, where none have arrived for so long that they would be missing."""
+        if self.images_missing(now_s):
+            self.image_s, self.exposure_s = now_s, math.nan
+
     def on_clock_reset(self) -> None:
         """Forget everything that has a stamp: the clock was set back."""
         self.history.clear()
@@ -123,11 +131,12 @@ class Perception:
         """Return the target at `time_s`, or None."""
         return self.tracking.estimate(time_s)
 
-    def position(self, estimate: TargetEstimate | None) -> TargetPosition:
-        """Return where the target is, with its uncertainty."""
+    def position(self, estimate: TargetEstimate | None) -> Callable[[], TargetPosition]:
+        """Return a function that returns where the target is as of now, with its uncertainty."""
         if estimate is None:
-            return UNKNOWN
-        return target_position(estimate, self.kinematics, self._shaft_variances, self.vergence_offset)
+            return lambda: UNKNOWN
+        offset = copy(self.vergence_offset)
+        return partial(target_position, estimate, self.kinematics, self._shaft_variances, offset)
 
     def unseen_s(self, now_s: float) -> float:
         """Return for how long images arrived that did not show the target; inf before the first that did.

@@ -1,7 +1,9 @@
 """The controller's report of every cycle, as GazeState carries it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +25,8 @@ class GazeReport:
     """Angles are estimated, residuals (version, vergence, tilt) are what is left to turn; NaN where unknown.
 
     `fault` says what is wrong with the joints' feedback or the images, `images_missing` whether no results of images
-    arrive. `attention` is its policy, what it attends to and why.
-    `fixation_m` (3,) is the midpoint of the gaze rays' closest approach and `miss_distance_m` how far they pass.
+    arrive. `attention` is its policy, what it attends to and why. Where target and fixation point are is computed when
+    it is read: most cycles' reports have no reader.
     """
 
     stamp_s: float
@@ -40,12 +42,30 @@ class GazeReport:
     residual_rad: tuple[float, float, float]
     residual_px: float
     contrast: float
-    target: TargetPosition
-    fixation_m: Array
-    miss_distance_m: float
+    locate_target: Callable[[], TargetPosition]
+    locate_fixation: Callable[[], tuple[Array, float]]
     fault: str = ""
     images_missing: bool = False
     attention: str = ""
+
+    @cached_property
+    def target(self) -> TargetPosition:
+        """The target's position."""
+        return self.locate_target()
+
+    @property
+    def fixation_m(self) -> Array:
+        """The midpoint of the gaze rays' closest approach (3,) [m]."""
+        return self._fixation[0]
+
+    @property
+    def miss_distance_m(self) -> float:
+        """How far the gaze rays pass one another [m]."""
+        return self._fixation[1]
+
+    @cached_property
+    def _fixation(self) -> tuple[Array, float]:
+        return self.locate_fixation()
 
 
 @dataclass(frozen=True)
@@ -75,14 +95,17 @@ def make_report(
     rig: Rig,
     fault: str = "",
     attention: str = "",
+    uses_images: bool = True,
 ) -> GazeReport:
-    """Return the state at `now_s` under this law and mode; `fault` is that of the feedback or the images."""
+    """Return the state at `now_s` under this law and mode; `fault` is that of the feedback or the images.
+
+    `uses_images` says whether results of images are needed now.
+    """
     known = perception.history.known and math.isfinite(now_s)
     joints = perception.history.shaft_rad if known else np.full(3, math.nan)
     estimate = perception.tracking.estimate(now_s) if known else None
     residual = residual_of(estimate, joints)
-    fixation, miss = fixation_of(joints, perception.kinematics)
-    images_missing = perception.images_missing(now_s)
+    images_missing = uses_images and perception.images_missing(now_s)
     reason = phases.reason if known else f"waiting: {fault}"
     if fault not in reason:
         reason = f"{reason}; {fault}"
@@ -104,9 +127,8 @@ def make_report(
         residual_rad=residual,
         residual_px=disparity_px(residual[1], rig.left_camera.fx_px),
         contrast=perception.judge.contrast,
-        target=perception.position(estimate),
-        fixation_m=fixation,
-        miss_distance_m=miss,
+        locate_target=perception.position(estimate),
+        locate_fixation=partial(fixation_of, joints, perception.kinematics),
         fault=fault,
         images_missing=images_missing,
         attention=attention,

@@ -7,6 +7,7 @@ it, at any distance: the left eye's pan to the target is version - vergence / 2,
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -56,7 +57,7 @@ class Innovation:
     covariance: Array
     distance: float
 
-    @property
+    @cached_property
     def negative_log_likelihood(self) -> float:
         """Negative logarithm of the likelihood, without its constant term."""
         return 0.5 * (self.distance + math.log(np.linalg.det(self.covariance)))
@@ -84,8 +85,10 @@ class KalmanFilter:
             noise[i, i] = self._drift**2 * duration_s
             if self.moves:
                 transition[i, i + 1] = duration_s
-                gain = np.array([0.5 * duration_s**2, duration_s]) * acceleration
-                noise[i : i + 2, i : i + 2] += np.outer(gain, gain)
+                angle, rate = 0.5 * duration_s**2 * acceleration, duration_s * acceleration
+                noise[i, i] += angle * angle
+                noise[i, i + 1] = noise[i + 1, i] = angle * rate
+                noise[i + 1, i + 1] = rate * rate
         self.state = transition @ self.state
         self.covariance = transition @ self.covariance @ transition.T + noise
 

@@ -6,6 +6,7 @@ jump looks like an outlier until a second measurement is consistent with it.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +35,7 @@ _LATEST_S = 1.0
 _COMPARABLE_S = 0.5
 _MINIMUM_WEIGHT = 0.3
 _FOLLOWING_VARIANCE = 1e-5
+_KEPT_ESTIMATES = 8
 
 
 def joints_of(angles_rad: Array) -> Array:
@@ -65,7 +67,7 @@ class TargetEstimate:
         """Tilt that fixates the target."""
         return float(self.angles_rad[2])
 
-    @property
+    @cached_property
     def joints_rad(self) -> Array:
         """Joint angles (3,), pan_left, pan_right, tilt, that fixate the target."""
         return joints_of(self.angles_rad)
@@ -75,7 +77,7 @@ class TargetEstimate:
         """How fast each joint (3,) turns while it follows the target."""
         return _TO_JOINTS @ self.rates_rad_s
 
-    @property
+    @cached_property
     def joint_sigmas_rad(self) -> Array:
         """Standard deviations (3,) of the joint angles that fixate the target."""
         return np.sqrt(np.diag(_TO_JOINTS @ self.covariance @ _TO_JOINTS.T))
@@ -105,6 +107,7 @@ class TargetFilter:
         self._moving = False
         self._outliers: list[Measurement] = []
         self._time_s = math.nan
+        self._estimates: dict[float, TargetEstimate] = {}  # at the times asked for since the last change
         self.last_accepted_s = math.nan
         self.last_innovation_rad = math.nan
 
@@ -130,6 +133,7 @@ class TargetFilter:
 
     def initialise(self, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
         """Start with a target at these angles (3,) with this covariance (3, 3), of unknown speed."""
+        self._estimates.clear()
         state, whole = np.zeros(6), np.zeros((6, 6))
         state[0::2], whole[0::2, 0::2] = angles_rad, covariance
         self._rest.state, self._rest.covariance = state, whole.copy()
@@ -147,6 +151,7 @@ class TargetFilter:
 
     def inflate_covariance(self, joint_variances: Array) -> None:
         """Add variances (3,) [rad^2] of pan_left, pan_right and tilt, as a move of the joints leaves them."""
+        self._estimates.clear()
         left, right, tilt = joint_variances
         extra = np.zeros((6, 6))
         extra[VERSION, VERSION] = 0.25 * (left + right)
@@ -164,6 +169,7 @@ class TargetFilter:
         """
         if not self.initialised or measurement.stamp_s < self._time_s - _LATEST_S:
             return False
+        self._estimates.clear()
         self._predict(measurement.stamp_s)
         rest = self._rest.innovation(measurement, self._time_s)
         motion = self._motion.innovations(measurement, self._time_s)
@@ -190,6 +196,7 @@ class TargetFilter:
             return False
         if not all(jumps.consistent(before, measurement) for before in consistent[:-1]):
             return False
+        self._estimates.clear()
         self._reopen(consistent[0], measurement)
         if jumps.continues_moving(consistent[0], measurement, self._bound(measurement)):
             self._moving, self._evidence = True, _EVIDENCE_TO_MOVE
@@ -198,6 +205,14 @@ class TargetFilter:
 
     def at(self, time_s: float) -> TargetEstimate:
         """Return the target at `time_s`. The extrapolated speed fades after a while, the uncertainty keeps growing."""
+        found = self._estimates.get(time_s)
+        if found is None:
+            if len(self._estimates) >= _KEPT_ESTIMATES:
+                self._estimates.clear()
+            found = self._estimates[time_s] = self._extrapolated(time_s)
+        return found
+
+    def _extrapolated(self, time_s: float) -> TargetEstimate:
         state, spread = self._motion.combined() if self._moving else (self._rest.state, self._rest.covariance)
         ahead_s = min(max(time_s - self._time_s, -_LONGEST_PREDICTION_S), _LONGEST_PREDICTION_S)
         straight_s = min(ahead_s, _COAST_STRAIGHT_S)
@@ -244,6 +259,8 @@ class TargetFilter:
 
     def _copy_place_to_rest(self) -> None:
         state, covariance = self._motion.combined()
+        # Arrays of their own: estimates that were returned before refer to the present ones.
+        self._rest.state, self._rest.covariance = self._rest.state.copy(), self._rest.covariance.copy()
         self._rest.state[0::2] = state[0::2]
         self._rest.covariance[0::2, 0::2] = covariance[0::2, 0::2] + np.eye(3) * _FOLLOWING_VARIANCE
 

@@ -49,6 +49,11 @@ class GoalMonitor:
         """The active goal, None if there is none."""
         return self._goal_id
 
+    @property
+    def has_outcomes(self) -> bool:
+        """True while there are outcomes to be popped."""
+        return bool(self._outcomes)
+
     def new_id(self) -> int:
         """Return the id of a new goal."""
         return next(self._ids)

@@ -1,7 +1,5 @@
 """Reports of the joints as angles of the eyes."""
 
-from dataclasses import replace
-
 from vergence_gaze.estimation.observations import JointReport
 from vergence_rig.rig import JOINT_NAMES, Rig
 
@@ -11,4 +9,4 @@ def in_eye_angles(report: JointReport, rig: Rig) -> JointReport:
     positions = {
         name: rig.eye_angle(name, rad) if name in JOINT_NAMES else rad for name, rad in report.positions_rad.items()
     }
-    return replace(report, positions_rad=positions)
+    return JointReport(report.stamp_s, positions)

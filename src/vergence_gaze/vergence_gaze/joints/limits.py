@@ -33,7 +33,7 @@ class CommandLimits:
 
     def nearest(self, angles_rad: Array) -> Array:
         """Return the angles nearest to `angles_rad` that the limits allow: finite ones are expected."""
-        allowed = np.clip(angles_rad, self.lower_rad, self.upper_rad)
+        allowed: Array = np.minimum(np.maximum(angles_rad, self.lower_rad), self.upper_rad)
         lacking = self.minimum_vergence_rad + _MARGIN_RAD - (allowed[1] - allowed[0])
         if lacking > 0:
             allowed[0] = max(allowed[0] - 0.5 * lacking, self.lower_rad[0])
@@ -73,11 +73,11 @@ class CommandLimits:
             return last_rad
         desired = self.nearest(np.where(np.isfinite(desired_rad), desired_rad, last_rad))
         reach = (self.speed_rad_s if speed_rad_s is None else speed_rad_s) * min(elapsed_s, LONGEST_STEP_S)
-        move = np.clip(desired - last_rad, -reach, reach)
+        move = np.minimum(np.maximum(desired - last_rad, -reach), reach)
         # The pans may arrive one after the other; a common fraction of the move keeps to the vergence limit on the way.
         room = last_rad[1] - last_rad[0] - self.minimum_vergence_rad
         closing = move[0] - move[1]
         if closing > room:
             move[:2] *= max(room, 0.0) / closing
-        limited: Array = np.clip(last_rad + move, self.lower_rad, self.upper_rad)
+        limited: Array = np.minimum(np.maximum(last_rad + move, self.lower_rad), self.upper_rad)
         return limited

@@ -78,16 +78,15 @@ class ShaftHistory:
             self.clear()
         if self.known and stamp_s <= self.newest_s:
             return False
-        angles = self.reported_rad.copy() if self.known else np.full(3, np.nan)
-        for i, name in enumerate(JOINT_NAMES):
-            value = positions_rad.get(name, math.nan)
-            if math.isfinite(value) and abs(value) <= math.tau:
-                angles[i] = value
+        before = self.reported_rad.tolist() if self.known else [math.nan] * 3
+        values = [float(positions_rad.get(name, math.nan)) for name in JOINT_NAMES]
+        # False for a NaN, too.
+        angles = np.array([new if abs(new) <= math.tau else old for new, old in zip(values, before, strict=True)])
         shafts = self._shafts.newest.angles_rad if self.known else angles
-        if not self._reported.add(stamp_s, JOINT_NAMES, angles.tolist()):
+        if not self._reported.add_angles(stamp_s, angles):
             return False
-        shafts = np.clip(shafts, angles - self.half_play_rad, angles + self.half_play_rad)
-        return self._shafts.add(stamp_s, JOINT_NAMES, shafts.tolist())
+        half_play = self.half_play_rad
+        return self._shafts.add_angles(stamp_s, np.minimum(np.maximum(shafts, angles - half_play), angles + half_play))
 
     def clear(self) -> None:
         """Remove all reports and commands."""
@@ -112,7 +111,8 @@ class ShaftHistory:
     def shaft_at(self, stamp_s: float) -> Array:
         """Return the estimated shaft angles (3,) at `stamp_s`; the ends are held."""
         reported, (before, _) = self.reported_at(stamp_s), self._shafts.bracket(stamp_s)
-        return np.clip(before.angles_rad, reported - self.half_play_rad, reported + self.half_play_rad)
+        half_play = self.half_play_rad
+        return np.minimum(np.maximum(before.angles_rad, reported - half_play), reported + half_play)
 
     def reported_at(self, stamp_s: float) -> Array:
         """Return the angles (3,) at `stamp_s` as they would have been reported then; the ends are held."""
@@ -130,10 +130,11 @@ class ShaftHistory:
         With `along_rad_s` (3,) it is the speed relative to these: how fast the eyes slip off a target that moves so.
         """
         samples = self._reported.spanning(begin_s, end_s)
-        fastest = 0.0
-        for before, after in pairwise(samples):
-            speeds = (after.angles_rad - before.angles_rad) / max(after.stamp - before.stamp, 1e-4)
-            fastest = max(fastest, float(np.abs(speeds - along_rad_s).max()))
+        fastest, along = 0.0, along_rad_s.tolist()
+        for (began_s, before), (ended_s, after) in pairwise(samples):
+            duration_s = max(ended_s - began_s, 1e-4)
+            for first, last, own in zip(before.tolist(), after.tolist(), along, strict=True):
+                fastest = max(fastest, abs((last - first) / duration_s - own))
         return fastest
 
     def _turning_from(self, onset_s: Array, before: JointSample, after: JointSample, stamp_s: float) -> Array:

@@ -1,6 +1,7 @@
 """gaze_controller_node: turns the eyes by the metric nodes' measurements, and serves gaze/look_at."""
 
 import math
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
+from vergence_common.camera_infos import subscribe_camera_info
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.joint_states import JointStateInput
 from vergence_common.node_main import run_node
@@ -30,16 +32,8 @@ from vergence_gaze.ros.goal_server import GoalServer
 from vergence_gaze.ros.look_at_server import LookAtServer
 from vergence_gaze.ros.point_frames import PointFrames
 from vergence_gaze.ros.point_head_server import make_point_head_server
-from vergence_msgs.msg import (
-    BoxVergence,
-    DetectorClasses,
-    EdgeVergence,
-    EyeRotation,
-    GazeState,
-    ObjectRequest,
-    TargetTrack,
-    TrackRequest,
-)
+from vergence_gaze.ros.vision_input import VisionInput
+from vergence_msgs.msg import DetectorClasses, GazeState, ObjectRequest, TrackRequest
 from vergence_rig.camera import CameraModel, CameraModelError
 from vergence_rig.eye_image import described_camera, eye_images
 from vergence_rig.kinematics import Kinematics
@@ -47,6 +41,7 @@ from vergence_rig.rig_file import load_rig
 
 _FEEDBACK_EVERY = 10
 _MARKERS_EVERY = 10
+_RESTING_PERIOD_S = 0.1  # of cycles, while nothing is commanded and nothing reads the reports
 
 
 class GazeControllerNode(Node):
@@ -62,7 +57,6 @@ class GazeControllerNode(Node):
         self._images = eye_images(self._rig, (self._cameras[0], self._cameras[1]))
         self._controller = GazeController(self._rig, _parameters(settings), 1.0 / values.control_rate_hz)
         settings.on_change(self._on_parameters)
-        self._described: dict[bool, tuple[object, ...]] = {}
         self._arrived: list[Observation] = []
         self._newest: GazeReport | None = None
         self._cycles = 0
@@ -70,38 +64,38 @@ class GazeControllerNode(Node):
 
         diagnostics = Diagnostics(self)
         diagnostics.add("gaze", self._report)
-        self._reads_edges = False
-        self._watch = watch = watch_qos(self, diagnostics)
+        watch = watch_qos(self, diagnostics)
         self._look_at = LookAtServer(self, self._controller, self._frames, self._images, watch)
         self._servers: list[GoalServer] = [self._look_at]
         point_head = make_point_head_server(self, self._controller, self._frames)
         if point_head is not None:
             self._servers.append(point_head)
-        self._command = watch.create_publisher(JointState, "joint_command")
+        for server in self._servers:
+            server.on_request = self._end_rest
+        self._command, self._to_command = watch.create_publisher(JointState, "joint_command"), convert.JointCommand()
         self._track_requests = watch.create_publisher(TrackRequest, "vergence/track_request")
         # Latched: what holds until the next message, for nodes that start later.
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._object_requests = watch.create_publisher(ObjectRequest, "vergence/object_request", latched)
-        self._state = watch.create_publisher(GazeState, "gaze/state")
-        self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point")
-        self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1))
+        read = self._update_readers
+        self._read = (False, False, False)
+        self._state = watch.create_publisher(GazeState, "gaze/state", matched=read)
+        self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point", matched=read)
+        self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1), matched=read)
         self._joint_input = JointStateInput(self, diagnostics, watch, lambda j: self._add(convert.joint_report(j)))
         watch.create_subscription(
             JointState, "servo_node/resolution", lambda m: self._add(convert.joint_resolution(m)), latched
         )
-        watch.create_subscription(TargetTrack, "vergence/track", self._on_track)
-        watch.create_subscription(
-            BoxVergence, "vergence/box", lambda m: self._add(convert.box_sighting(m, self._images[0].fx_px))
-        )
-        watch.create_subscription(EyeRotation, "vergence/eye_rotation", lambda m: self._add(convert.eye_rotation(m)))
+        self._vision = VisionInput(self, watch, self._add, lambda: self._images[0])
         watch.create_subscription(DetectorClasses, "vergence/detector_classes", self._on_classes, latched)
         watch.create_subscription(PointStamped, "gaze/target", self._on_target)
         watch.create_subscription(String, "gaze/attention", self._on_attention)
-        watch.create_subscription(CameraInfo, "left/camera_info", lambda m: self._on_camera(m, left=True))
-        watch.create_subscription(CameraInfo, "right/camera_info", lambda m: self._on_camera(m, left=False))
+        subscribe_camera_info(watch, "left/camera_info", lambda m: self._on_camera(m, left=True))
+        subscribe_camera_info(watch, "right/camera_info", lambda m: self._on_camera(m, left=False))
         self.create_service(SetBool, "~/enable", self._on_enable)
         self.create_service(Trigger, "~/stop", self._on_stop)
-        self._timer = self.create_timer(1.0 / values.control_rate_hz, self._cycle)
+        self._period_s, self._resting = 1.0 / values.control_rate_hz, False
+        self._timer = self.create_timer(self._period_s, self._cycle)
 
     @property
     def resolution_rad(self) -> list[float]:
@@ -114,22 +108,11 @@ class GazeControllerNode(Node):
     def _add(self, observation: Observation) -> None:
         self._arrived.append(observation)
 
-    def _on_track(self, message: TargetTrack) -> None:
-        if message.contrast_window_px:
-            self._add(convert.track_contrast(message))
-        elif not self._reads_edges and message.status != TargetTrack.STATUS_UNUSABLE_IMAGES:
-            # Another tracker says nothing of contrast: vergence/edge does, and costs both sides more.
-            self._reads_edges = True
-            self._watch.create_subscription(EdgeVergence, "vergence/edge", self._on_edge)
-        self._add(convert.track_sighting(message, self._images[0]))
-
-    def _on_edge(self, message: EdgeVergence) -> None:
-        self._add(convert.edge_contrast(message))
-
     def _on_classes(self, message: DetectorClasses) -> None:
         self._look_at.classes = tuple(message.names)
 
     def _on_target(self, message: PointStamped) -> None:
+        self._end_rest()
         stamp_s = to_seconds(message.header.stamp) or self._now_s()
         try:
             place = self._frames.in_rig(message.point, message.header.frame_id, stamp_s)
@@ -140,6 +123,7 @@ class GazeControllerNode(Node):
 
     def _on_attention(self, message: String) -> None:
         if message.data in POLICIES:
+            self._end_rest()
             self._controller.set_attention(message.data, self._now_s())
         else:
             allowed = ", ".join(POLICIES)
@@ -148,10 +132,6 @@ class GazeControllerNode(Node):
             )
 
     def _on_camera(self, message: CameraInfo, left: bool) -> None:
-        described = (message.width, message.height, message.distortion_model, tuple(message.k), tuple(message.d))
-        if self._described.get(left) == described:
-            return  # it comes with every image
-        self._described[left] = described
         model: CameraModel | None
         try:
             model = convert.camera_model(message)
@@ -164,45 +144,69 @@ class GazeControllerNode(Node):
             self._cameras[0 if left else 1] = model
             self._images = self._look_at.images = eye_images(self._rig, (self._cameras[0], self._cameras[1]))
 
+    def _update_readers(self, _: object = None) -> None:
+        """Record which reports have subscribers: to ask in every cycle would cost as much as publishing."""
+        self._read = tuple(p.get_subscription_count() > 0 for p in (self._state, self._fixation, self._markers))
+        if any(self._read):
+            self._end_rest()
+
+    def _end_rest(self) -> None:
+        """Go on at the full rate, with what has arrived: something is requested or read."""
+        if not self._resting:
+            return
+        self._resting = False
+        self._timer.timer_period_ns = round(1e9 * self._period_s)
+        self._timer.reset()
+        arrived, self._arrived = self._arrived, []
+        self._controller.observe(arrived, self._now_s())
+
     def _cycle(self) -> None:
         now_s = self._now_s()
+        arrived, self._arrived = self._arrived, []
+        self._cycles += 1
+        if not self._controller.rests(now_s) or any(self._read):
+            self._end_rest()
+        elif not self._resting:
+            self._resting = True
+            self._timer.timer_period_ns = round(1e9 * max(self._period_s, _RESTING_PERIOD_S))
         for server in self._servers:
             server.forward_cancels(now_s)
-        arrived, self._arrived = self._arrived, []
+        self._vision.update(self._controller.uses_images, monotonic())
         command = self._controller.step(now_s, arrived, self._joint_input.problem())
         self._newest = command.report
-        self._cycles += 1
         for server in self._servers:
             server.on_cycle(command)
         self._publish(command, now_s)
 
     def _publish(self, command: Command, now_s: float) -> None:
-        report = command.report
+        report, (state_read, fixation_read, markers_read) = command.report, self._read
         if command.joints_rad is not None:
-            self._command.publish(convert.joint_command(command.joints_rad, now_s))
+            self._command.publish(self._to_command(command.joints_rad, now_s))
         if command.track_request is not None:
             self._track_requests.publish(convert.track_request(command.track_request, self._images))
         if command.object_request is not None:
             self._object_requests.publish(convert.object_request(command.object_request, now_s))
-        if self._state.get_subscription_count():
+        if state_read:
             self._state.publish(convert.gaze_state(report, now_s))
-        if math.isfinite(report.fixation_m[0]) and self._fixation.get_subscription_count():
+        if fixation_read and math.isfinite(report.fixation_m[0]):
             self._fixation.publish(convert.point_stamped(report.fixation_m, report.stamp_s))
         if self._cycles % _FEEDBACK_EVERY == 0:
             for server in self._servers:
                 server.publish_feedback(report)
-        if self._cycles % _MARKERS_EVERY == 0 and self._markers.get_subscription_count():
+        if markers_read and self._cycles % _MARKERS_EVERY == 0:
             half = 0.5 * report.vergence_rad
             angles = np.array([report.version_rad - half, report.version_rad + half, report.tilt_rad])
             if np.isfinite(angles).all():
                 self._markers.publish(convert.gaze_markers(angles, report.fixation_m, self._kinematics, now_s))
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        self._end_rest()
         self._controller.enable(request.data, self._now_s())
         response.success, response.message = True, "enabled" if request.data else "disabled: the eyes hold still"
         return response
 
     def _on_stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._end_rest()
         self._controller.stop(self._now_s())
         response.success, response.message = True, "stopped: the eyes hold still"
         return response
@@ -211,6 +215,7 @@ class GazeControllerNode(Node):
         self._controller.set_parameters(_parameters(settings), self._now_s())
 
     def _report(self) -> Report:
+        self._update_readers()  # not every middleware reports matches
         report, encoder = self._newest, self._controller.vergence_offset
         if report is None:
             return Report(WARN, "no control cycle yet")

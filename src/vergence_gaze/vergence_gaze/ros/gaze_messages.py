@@ -216,10 +216,17 @@ def look_at_feedback(report: GazeReport) -> LookAt.Feedback:
     )
 
 
-def joint_command(joints_rad: Array, stamp_s: float) -> JointState:
-    """Return the command by joint name."""
-    header = Header(stamp=to_stamp(stamp_s))
-    return JointState(header=header, name=list(JOINT_NAMES), position=array("d", joints_rad.tolist()))
+class JointCommand:
+    """Commands by joint name. One message is filled anew for each: making one costs more than filling it."""
+
+    def __init__(self) -> None:
+        self._message = JointState(name=list(JOINT_NAMES))
+
+    def __call__(self, joints_rad: Array, stamp_s: float) -> JointState:
+        """Return the command, valid until the next call."""
+        self._message.header.stamp = to_stamp(stamp_s)
+        self._message.position = array("d", joints_rad.tolist())
+        return self._message
 
 
 def gaze_state(report: GazeReport, now_s: float) -> GazeState:

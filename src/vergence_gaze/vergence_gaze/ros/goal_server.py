@@ -1,5 +1,6 @@
 """What the actions of the controller share: each goal runs in the controller until a control cycle reports its end."""
 
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
@@ -19,6 +20,8 @@ class GoalServer:
 
     def __init__(self, node: Node, controller: GazeController, action: Any, name: str) -> None:
         self._node, self._controller, self._name = node, controller, name
+        self.on_request: Callable[[], None] = lambda: None
+        """Called before a request is looked at."""
         self._goals: dict[int, ServerGoalHandle] = {}
         self._outcomes: dict[bytes, Outcome] = {}
         self._newest: GazeReport | None = None
@@ -85,6 +88,7 @@ class GoalServer:
         )
 
     def _on_request(self, request: Any) -> GoalResponse:
+        self.on_request()
         try:
             self._controller.check(self._goal(request), self._now_s())
         except ValueError as error:

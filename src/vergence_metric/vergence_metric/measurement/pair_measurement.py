@@ -3,14 +3,15 @@
 import math
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from numpy.typing import NDArray
 
+from vergence_metric.alignment.alignment import Alignment
 from vergence_metric.disparity import Disparity, make_estimator
 from vergence_metric.disparity.shared_estimate import SharedEstimate
-from vergence_metric.measurement.edge_metric import EdgeMetric, EdgeMetricResult
+from vergence_metric.measurement.edge_metric import AlignedPair, EdgeMetric, EdgeMetricResult
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.tracking.eye_view import EyeView
@@ -29,6 +30,16 @@ from vergence_rig.rig import Rig
 _SAME_IMAGE_S = 0.1  # a request is for the pair nearest to its stamp, at most this far from it
 
 
+@dataclass(frozen=True)
+class SeenPair:
+    """Grey ideal images (h, w) of both eyes, not aligned yet, with the eyes' angles at their stamps."""
+
+    stamp_s: float
+    left: NDArray[Any]
+    right: NDArray[Any]
+    eyes: EyeAngles
+
+
 class PairMeasurement:
     """Metric I, the fovea's signed disparity and the followed target of successive pairs, in order of their stamps."""
 
@@ -39,7 +50,7 @@ class PairMeasurement:
         self._tracker: Tracker | None = None
         self._camera: CameraModel | None = None
         self._memory = PairMemory(parameters.tracker.memory_s)
-        self._requests: deque[TrackRequest] = deque()
+        self._requests: deque[tuple[TrackRequest, SeenPair | None]] = deque()
         self._awaited_motion: AwaitedMotion | None = None
         self._ids_used = 0
         self._newest_id = 0
@@ -87,9 +98,25 @@ class PairMeasurement:
         camera = self._camera or self._rig_camera
         return self._classifier.update(edge.least_contrast.contrast, math.atan(error_px / camera.fx_px), confidence)
 
-    def request_track(self, request: TrackRequest) -> None:
-        """Let the tracker follow a point, from the next pair on; may be called from another thread."""
-        self._requests.append(request)
+    def request_track(self, request: TrackRequest, seen: SeenPair | None = None) -> None:
+        """Let the tracker follow a point, from the next pair on; may be called from another thread.
+
+        `seen` is the pair of the request, where it is none of those that `track` or `remember` were called with.
+        """
+        self._requests.append((request, seen))
+
+    def remember(
+        self,
+        left: NDArray[Any],
+        right: NDArray[Any],
+        stamp_s: float,
+        eyes: EyeAngles | None,
+        camera: CameraModel | None,
+    ) -> None:
+        """Keep a pair for requests, and measure nothing in it; arguments as of `edge` and `track`."""
+        pair, camera = self._metric.align(left, right), camera or self._rig_camera
+        if eyes is not None and (camera.height_px, camera.width_px) == pair.left_grey.shape:
+            self._store(pair, stamp_s, self._views(camera, eyes))
 
     def track(
         self,
@@ -119,13 +146,8 @@ class PairMeasurement:
         if self._tracker is None or self._camera is None or not camera.equals(self._camera):
             self._camera, self._ids_used = camera, self._newest_id
             self._tracker = make_tracker(self._parameters.tracker, self._estimator, camera, self._kinematics)
-        self._pass_on_requests(self._tracker, edge)
-        views = tuple(
-            EyeView(camera, pan_rad, eyes.tilt_rad, self._kinematics.pitch_rad)
-            for pan_rad in (eyes.pan_left_rad, eyes.pan_right_rad)
-        )
-        pair = StoredPair(stamp_s, edge.left_grey, edge.right_grey, (views[0], views[1]))
-        self._memory.add(pair)
+        self._pass_on_requests(self._tracker, edge, camera)
+        pair = self._store(edge, stamp_s, self._views(camera, eyes))
         if self._awaited_motion is not None:
             found = self._awaited_motion.update(pair)
             if isinstance(found, str):
@@ -137,9 +159,33 @@ class PairMeasurement:
         self._newest_id = self._ids_used + track.track_id
         return replace(track, track_id=self._newest_id)
 
-    def _pass_on_requests(self, tracker: Tracker, edge: EdgeMetricResult) -> None:
+    def _views(self, camera: CameraModel, eyes: EyeAngles) -> tuple[EyeView, EyeView]:
+        left, right = (
+            EyeView(camera, pan_rad, eyes.tilt_rad, self._kinematics.pitch_rad)
+            for pan_rad in (eyes.pan_left_rad, eyes.pan_right_rad)
+        )
+        return left, right
+
+    def _store(
+        self, pair: AlignedPair | EdgeMetricResult, stamp_s: float, views: tuple[EyeView, EyeView]
+    ) -> StoredPair:
+        stored = StoredPair(stamp_s, pair.left_grey, pair.right_grey, views)
+        self._memory.add(stored)
+        return stored
+
+    def _stored(
+        self, request: TrackRequest, seen: SeenPair | None, camera: CameraModel, by: Alignment
+    ) -> StoredPair | None:
+        """Return the pair of a request, None if it is not known."""
+        if seen is None or (camera.height_px, camera.width_px) != seen.left.shape:
+            return self._memory.nearest(request.stamp_s, _SAME_IMAGE_S)
+        if abs(seen.stamp_s - request.stamp_s) > _SAME_IMAGE_S:
+            return None
+        return StoredPair(seen.stamp_s, seen.left, by.apply(seen.right), self._views(camera, seen.eyes))
+
+    def _pass_on_requests(self, tracker: Tracker, edge: EdgeMetricResult, camera: CameraModel) -> None:
         while self._requests:
-            request, self.unmet_request = self._requests.popleft(), ""
+            (request, seen), self.unmet_request = self._requests.popleft(), ""
             self._awaited_motion = AwaitedMotion(request.goal_id) if request.motion else None
             if request.motion:
                 continue
@@ -149,7 +195,7 @@ class PairMeasurement:
             if not request.left_eye:
                 height, width = edge.right_grey.shape
                 request = replace(request, pixel=edge.alignment.aligned(*request.pixel, width, height))
-            pair = self._memory.nearest(request.stamp_s, _SAME_IMAGE_S)
+            pair = self._stored(request, seen, camera, edge.alignment)
             if pair is None:
                 self.unmet_request = f"no pair is stored for goal {request.goal_id}, stamp {request.stamp_s:.3f} s"
             else:

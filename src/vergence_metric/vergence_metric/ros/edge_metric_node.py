@@ -1,8 +1,10 @@
 """edge_metric_node: pairs of images in, metric I, the signed error of the fovea and the followed target out."""
 
 import math
+from collections import deque
 from collections.abc import Sequence
-from time import monotonic_ns
+from functools import partial
+from time import monotonic, monotonic_ns
 from typing import Any
 
 from sensor_msgs.msg import Image
@@ -13,13 +15,14 @@ from vergence_common.images import array_to_image
 from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import IMAGE_QOS, watch_qos
+from vergence_common.stamps import to_nanoseconds
 from vergence_metric.alignment.parameters import AlignmentParameters
 from vergence_metric.disparity.angular_disparity import angular_disparity
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.edges.parameters import ContrastParameters, EdgeParameters
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.measurement.overlay import draw_overlay
-from vergence_metric.measurement.pair_measurement import PairMeasurement
+from vergence_metric.measurement.pair_measurement import PairMeasurement, SeenPair
 from vergence_metric.measurement.parameters import GROUPS, PairMeasurementParameters, VergedParameters
 from vergence_metric.pairs.eye_order import EyeOrderMonitor
 from vergence_metric.pairs.ideal_images import Models
@@ -29,11 +32,13 @@ from vergence_metric.pairs.picture_faults import PictureMonitor
 from vergence_metric.ros.edge_messages import edge_message, error_message, unusable_edge_message, unusable_error_message
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
 from vergence_metric.ros.stereo_input import IdealPair, ImagePair, StereoInput
+from vergence_metric.ros.stored_images import StoredImages
 from vergence_metric.ros.track_messages import track_message, track_request, unusable_track_message
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_msgs.msg import EdgeVergence, TargetTrack, TrackRequest, VergenceError
 from vergence_rig.rig_file import load_rig
 
+_CONNECTED_NS = 500_000_000  # after which cameras and this node have found one another again
 _JOINT_SAMPLES_NS = 500_000_000  # longer than two pairs can be apart while the tracker still follows
 
 
@@ -59,6 +64,8 @@ class EdgeMetricNode(MetricNode):
         submit = self._worker.submit
         self._stereo = StereoInput(self, stereo, pairing, diagnostics, qos, submit, self._rig, images=self._images)
         self._joint_input = self._subscribe_joints(diagnostics, qos)
+        self._stored = StoredImages(self)
+        self._requests: deque[tuple[TrackRequest, ImagePair | None]] = deque()
         self._request_subscription = qos.create_subscription(TrackRequest, "vergence/track_request", self._on_request)
         self._settings.on_change(self._on_settings)
         diagnostics.add("measurement", self._report)
@@ -70,8 +77,33 @@ class EdgeMetricNode(MetricNode):
         limit_threads(stereo.threads)
         self._stereo.set_parameters(stereo, settings.get(PairingParameters))
 
+    def _may_pause(self) -> bool:
+        # A request names an image of the past: it is here, or the cameras have it, or it is lost.
+        return self._stored.available or not self.count_publishers("vergence/track_request")
+
     def _on_request(self, message: TrackRequest) -> None:
-        self._measurement.request_track(track_request(message, self._stereo.eye_images))
+        missed = to_nanoseconds(message.header.stamp) < self._stereo.resumed_ns + _CONNECTED_NS
+        if message.goal_id and (self._stereo.paused or missed) and self._stored.available:
+            self._heard_s = monotonic()
+            self._stereo.resume()
+            self._stored.get(message.header.stamp, partial(self._add_request, message))
+        else:
+            self._add_request(message, None)
+
+    def _add_request(self, message: TrackRequest, stored: ImagePair | None) -> None:
+        self._requests.append((message, stored))
+
+    def _pass_on_requests(self) -> None:
+        """Pass the requests on, in pixels of ideal images; in the measuring thread."""
+        while self._requests:
+            message, stored = self._requests.popleft()
+            seen = None
+            if stored is not None:
+                ideal = self._stereo.ideal(stored, grey=True)
+                eyes = self._joints.at(stored.left_stamp_ns, stored.right_stamp_ns)
+                if eyes is not None:
+                    seen = SeenPair(stored.left_stamp_ns * 1e-9, ideal.left, ideal.right, eyes)
+            self._measurement.request_track(track_request(message, self._stereo.eye_images), seen)
 
     def _measure(self, pair: ImagePair) -> None:
         self._measurement.set_parameters(_measurement_parameters(self._settings))
@@ -86,6 +118,13 @@ class EdgeMetricNode(MetricNode):
         models = ideal.cameras
         with self._times.measure("pictures"):
             self._update_order(pair, ideal)
+        self._pass_on_requests()
+        if not self._subscribers():
+            eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
+            stamp_s = pair.left_stamp_ns * 1e-9
+            self._measurement.remember(ideal.left, ideal.right, stamp_s, eyes, models and models[0])
+            self._failure = None
+            return
         with self._times.measure("metric"):
             edge = self._measurement.edge(ideal.left, ideal.right, ideal.seen_px)
         if self._edge_publisher.get_subscription_count() or self._error_publisher.get_subscription_count():

@@ -21,7 +21,7 @@ from vergence_metric.ros.stereo_input import StereoInput
 from vergence_rig.joint_history import JointHistory
 from vergence_rig.rig import JOINT_NAMES, Rig
 
-_UNHEARD_S = 30.0  # without subscribers, until no images are received
+_UNHEARD_S = 5.0  # without subscribers, until no images are received
 
 
 def limit_threads(count: int) -> None:
@@ -63,6 +63,10 @@ class MetricNode(Node):
     def _subscribers(self) -> int:
         return sum(publisher.get_subscription_count() for publisher in self._outputs)
 
+    def _may_pause(self) -> bool:
+        """Return whether images need not be received while no output has a subscriber."""
+        return True
+
     def _on_matched(self, _: object) -> None:
         if self._subscribers():
             self._heard_s = monotonic()
@@ -74,7 +78,7 @@ class MetricNode(Node):
         if subscribers:
             self._heard_s = now_s
             self._stereo.resume()
-        elif now_s - self._heard_s > _UNHEARD_S:
+        elif now_s - self._heard_s > _UNHEARD_S and self._may_pause():
             self._stereo.pause()
         if self._stereo.paused:
             return Report(OK, "nothing is measured: no output has a subscriber", {"subscribers": 0})

@@ -17,6 +17,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from vergence_common.awaited import report_awaited
+from vergence_common.camera_infos import subscribe_camera_info
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.images import ImageError, compressed_to_array, image_to_array
 from vergence_common.local_images import LocalImages
@@ -111,7 +112,6 @@ class StereoInput:
         self._size_mismatch: str | None = None
         self._size_mismatches = 0
         self._info_errors: list[str | None] = [None, None]
-        self._info_seen: list[tuple[Any, ...] | None] = [None, None]
         self._deadline = node.create_timer(
             1.0, self._on_deadline, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False
         )
@@ -120,6 +120,9 @@ class StereoInput:
         self._to_pixels: Callable[[Any], npt.NDArray[np.uint8]] = compressed_to_array if compressed else image_to_array
         self._health = tuple(StreamHealth(f"{name}/{suffix}", monotonic()) for name in SIDES)
         self._subscriptions: list[Subscription] = []
+        self._local: list[tuple[str, Any]] = []
+        self.resumed_ns = -1_000_000_000
+        """ROS time of the last `resume` [ns]; far in the past where there was none."""
         self._images, self._topics = images, [node.resolve_topic_name(f"{name}/image_raw") for name in SIDES]
         self._lock = images.lock if images else nullcontext()
         self._connect = partial(self._subscribe_all, qos, message_type, suffix, images)
@@ -133,30 +136,37 @@ class StereoInput:
     @property
     def paused(self) -> bool:
         """True while nothing is received, since `pause`."""
-        return not self._subscriptions and self._images is None
+        return not self._subscriptions
 
     def pause(self) -> None:
-        """Receive nothing until `resume`; images shared with other nodes of the process are received all the same."""
-        if self._images is None:
-            for subscription in self._subscriptions:
-                self._node.destroy_subscription(subscription)
-            self._subscriptions.clear()
+        """Receive nothing until `resume`; images that this node shares with others are received all the same."""
+        if self._images is not None and not self._local:
+            return
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+        for topic, receiver in self._local:
+            self._images.remove(topic, receiver)  # type: ignore[union-attr]
+        self._local.clear()
 
     def resume(self) -> None:
         """Receive images again after `pause`."""
         if self.paused:
             self._health = tuple(StreamHealth(health.topic, monotonic()) for health in self._health)
+            self.resumed_ns = self._node.get_clock().now().nanoseconds
             self._connect()
 
     def _subscribe_all(self, qos: QosWatch, message_type: Any, suffix: str, images: LocalImages | None) -> None:
         for side, name in enumerate(SIDES):
             if images is not None and images.offers(self._topics[side]):
-                images.receive(self._topics[side], partial(self._on_local, side))
+                self._local.append((self._topics[side], partial(self._on_local, side)))
+                images.receive(*self._local[-1])
             else:
                 self._subscribe(qos, message_type, f"{name}/{suffix}", self._on_image, side, IMAGE_QOS)
                 if images is not None:
                     images.offer(self._topics[side])
-            self._subscribe(qos, CameraInfo, f"{name}/camera_info", self._on_info, side, _INFO_QOS)
+            on_info = partial(self._on_info, side)
+            self._subscriptions.append(subscribe_camera_info(qos, f"{name}/camera_info", on_info, _INFO_QOS))
 
     def set_parameters(self, stereo: StereoParameters, pairing: PairingParameters) -> None:
         """Use these from the next image on; the transport stays as it is."""
@@ -247,9 +257,6 @@ class StereoInput:
 
     def _on_info(self, side: int, message: CameraInfo) -> None:
         seen = (message.width, message.height, tuple(message.k), tuple(message.d), message.distortion_model)
-        if seen == self._info_seen[side]:
-            return
-        self._info_seen[side] = seen
         try:
             self.models[side] = CameraModel.from_camera_info_values(*seen)
             self._info_errors[side] = None

@@ -28,7 +28,7 @@ class EyeView:
 
     def direction(self, pixel: Pixel) -> np.ndarray:
         """Return the unit direction (3,) in rig_base of a pixel."""
-        x, y = self.camera.undistort((pixel,))[0].tolist()
+        x, y = self.camera.undistorted(*pixel)
         length = math.sqrt(x * x + y * y + 1.0)
         return np.asarray(self._rig_from_optical @ np.array((x / length, y / length, 1.0 / length)))
 
@@ -37,8 +37,7 @@ class EyeView:
         x, y, z = (direction @ self._rig_from_optical).tolist()
         if not z > 0.0:
             return math.nan, math.nan
-        u, v = self.camera.distort(((x / z, y / z),))[0].tolist()
-        return u, v
+        return self.camera.distorted(x / z, y / z)
 
     def rays(self, pixels: NDArray[np.floating]) -> Points:
         """Return the unit directions (N, 3) in rig_base of pixels (N, 2)."""

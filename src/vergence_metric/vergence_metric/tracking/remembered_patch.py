@@ -9,6 +9,7 @@ Along an edge or without texture, where a level looks the same everywhere, the p
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -173,7 +174,7 @@ class RememberedPatch:
         area = cut(image, at[0] - left, at[1] - top, left + right + scale, top + bottom + scale)
         surface = _correlation(_reduced(area, scale), template)
         evidence = _evidence(surface)
-        ranked = evidence - _cost(surface, prior)
+        ranked = evidence - _cost(surface.shape, prior)
         j, i = divmod(int(ranked.argmax()), ranked.shape[1])
         rows, columns = np.nonzero(evidence >= evidence[j, i] - _AS_ALIKE)
         spread_px = scale * float(np.hypot(rows - j, columns - i).max())
@@ -206,10 +207,13 @@ def _reduced(image: Image, scale: int) -> Image:
     return np.asarray(cv2.resize(image[: size[1] * scale, : size[0] * scale], size, interpolation=cv2.INTER_AREA))
 
 
-def _cost(surface: NDArray[np.float32], prior: float) -> NDArray[np.float32]:
+@lru_cache(maxsize=32)
+def _cost(shape: tuple[int, ...], prior: float) -> NDArray[np.float32]:
     """Return by how much each place of a search is worse for its distance from the middle: `prior` at the rim."""
-    down, across = (np.linspace(-1.0, 1.0, n, dtype=np.float32) ** 2 if n > 1 else np.zeros(1) for n in surface.shape)
-    return np.asarray(np.float32(prior) * np.add.outer(down, across), np.float32)
+    down, across = (np.linspace(-1.0, 1.0, n, dtype=np.float32) ** 2 if n > 1 else np.zeros(1) for n in shape)
+    cost = np.asarray(np.float32(prior) * np.add.outer(down, across), np.float32)
+    cost.flags.writeable = False
+    return cost
 
 
 def _best_near(image: Image, template: Image, sides: Sides, place: Pixel, reach: int) -> tuple[Pixel, float, float]:
@@ -221,7 +225,7 @@ def _best_near(image: Image, template: Image, sides: Sides, place: Pixel, reach:
     x0, y0 = round(place[0]) - left - reach, round(place[1]) - top - reach
     area = cut(image, x0, y0, template.shape[1] + 2 * reach, template.shape[0] + 2 * reach)
     surface = _correlation(area, template)
-    nearest = _evidence(surface) - _cost(surface, _POINT_PRIOR)
+    nearest = _evidence(surface) - _cost(surface.shape, _POINT_PRIOR)
     j, i = divmod(int(nearest.argmax()), surface.shape[1])
     di, dj = peak_offset(nearest, i, j)
     return (x0 + left + i + di, y0 + top + j + dj), float(surface[j, i]), float(surface[reach, reach])
@@ -233,5 +237,8 @@ def _evidence(similarity: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _correlation(area: Image, template: Image) -> NDArray[np.float32]:
-    surface = cv2.matchTemplate(area, template, cv2.TM_CCOEFF_NORMED)
-    return np.asarray(np.nan_to_num(surface, nan=-1.0, posinf=-1.0, neginf=-1.0), np.float32)
+    surface = np.asarray(cv2.matchTemplate(area, template, cv2.TM_CCOEFF_NORMED), np.float32)
+    usable = np.isfinite(surface)
+    if not usable.all():
+        surface[~usable] = -1.0
+    return surface

@@ -38,6 +38,9 @@ from vergence_servo.servo_head import Mode
 from vergence_servo.servo_reports import CommandCounts, channel_report, commands_report, head_report
 from vergence_servo.trajectory import Trajectory, check_end, start_delay_s
 
+_RESTING_AFTER_S = 1.0  # without motion, from when joint_states come at a lower rate
+_RESTING_PERIOD_S = 0.1
+
 COMMAND_TOPICS = ("joint_command", "~/commands", "joint_trajectory")
 
 
@@ -95,8 +98,12 @@ class ServoNode(Node):
         )
         # Servos are real also beside simulated time: their time-outs must not stand with /clock.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0 / values.update_rate_hz, self._step, clock=steady)
-        self.create_timer(1.0 / values.state_rate_hz, self._publish_state, clock=steady)
+        self._updates = self.create_timer(1.0 / values.update_rate_hz, self._step, clock=steady)
+        self._period_s = 1.0 / values.state_rate_hz
+        # Time-outs and the guardian's heartbeat go on with every report.
+        self._resting_period_s = max(self._period_s, min(_RESTING_PERIOD_S, 0.1 * values.guardian_timeout_s))
+        self._moved_s = time.monotonic()
+        self._reports = self.create_timer(self._period_s, self._on_report, clock=steady)
         self.create_timer(1.0, self._check_commanders, clock=steady)
 
     def _step(self) -> None:
@@ -155,7 +162,16 @@ class ServoNode(Node):
             return error
         self._counts.accept(topic, now_s)
         self._head.step(now_s)
+        self._end_rest()
         return None
+
+    def _end_rest(self) -> None:
+        """Step and report at the full rate again, the pose before any motion first."""
+        if self._updates.is_canceled():
+            self._updates.reset()
+            self._reports.timer_period_ns = round(1e9 * self._period_s)
+            self._reports.reset()
+            self._publish_state()
 
     def _check_stamp(self, message: JointState) -> None:
         self._stamps.check(to_nanoseconds(message.header.stamp), self.get_clock().now().nanoseconds)
@@ -168,10 +184,19 @@ class ServoNode(Node):
     def _on_trigger(self, act: Callable[[float], None], response: Trigger.Response) -> Trigger.Response:
         try:
             act(time.monotonic())
+            self._end_rest()
             response.success, response.message = True, self._head.mode.value
         except CommandRefusedError as error:
             response.success, response.message = False, str(error)
         return response
+
+    def _on_report(self) -> None:
+        if self._updates.is_canceled():
+            self._step()
+        elif time.monotonic() - self._moved_s > _RESTING_AFTER_S:
+            self._updates.cancel()
+            self._reports.timer_period_ns = round(1e9 * self._resting_period_s)
+        self._publish_state()
 
     def _publish_state(self) -> None:
         now_s = time.monotonic()
@@ -180,6 +205,8 @@ class ServoNode(Node):
         elapsed_s = max(now_s - before_s, 1e-3)
         velocities = {name: (position - before.get(name, position)) / elapsed_s for name, position in positions.items()}
         self._reported_rad = (now_s, positions)
+        if self._head.moving or positions != before:
+            self._moved_s = now_s
         self._states.publish(convert.joint_state(self.get_clock().now().to_msg(), positions, velocities))
 
     def _check_commanders(self) -> None:

@@ -22,11 +22,11 @@ from vergence_sim.parameters import SimParameters
 from vergence_sim.photo.pair import PhotoPoint, read_pair
 from vergence_sim.photo.parameters import GROUPS, PhotoParameters, PlantParameters, sim_parameters
 from vergence_sim.photo.world import PhotoWorld, cropped
-from vergence_sim.ros.real_time_node import RealTimeNode
+from vergence_sim.ros.world_node import WorldNode
 from vergence_sim.world import EYES
 
 
-class PhotoNode(RealTimeNode):
+class PhotoNode(WorldNode):
     """Both eyes before a pair of photographs, in real time."""
 
     def __init__(self, **options: Any) -> None:

@@ -11,14 +11,17 @@ from vergence_common.parameters import ParameterSet
 from vergence_msgs.msg import TrueBoxes, TrueVergence
 from vergence_rig.rig_file import load_rig
 from vergence_sim.parameters import GROUPS, NODE_GROUPS, SimParameters
-from vergence_sim.ros.real_time_node import RealTimeNode
 from vergence_sim.ros.sim_messages import true_boxes, true_vergence
+from vergence_sim.ros.world_node import WorldNode
 from vergence_sim.simulator import Simulator
 from vergence_sim.world import EYES
 
 
-class SimNode(RealTimeNode):
+class SimNode(WorldNode):
     """MuJoCo's world in real time; the simulation's thread owns it and its OpenGL context."""
+
+    alone = False
+    """True where this process makes no other simulator, whose memory it would share."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("sim_node", NODE_GROUPS, **options)
@@ -35,7 +38,7 @@ class SimNode(RealTimeNode):
         ]
 
     def _make_world(self) -> Simulator:
-        return Simulator(self._sim_parameters(self._settings), self._rig)
+        return Simulator(self._sim_parameters(self._settings), self._rig, alone=self.alone)
 
     def _sim_parameters(self, settings: ParameterSet) -> SimParameters:
         return SimParameters(*(settings.get(group) for _, group in GROUPS))  # type: ignore[arg-type]
@@ -66,4 +69,5 @@ class SimNode(RealTimeNode):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node; see `vergence_common.node_main`."""
+    SimNode.alone = True
     return run_node(SimNode, args, NODE_GROUPS)

@@ -32,7 +32,7 @@ _ROUNDING_S = 1e-6
 _ASKED_EVERY_S = 0.05
 
 
-class RealTimeNode(Node):
+class WorldNode(Node):
     """One thread owns the world; callbacks put commands into a queue that it drains.
 
     A second thread turns exposures into images (blur, lens, noise, JPEG) while the first goes on. Subclasses say what
