@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ from vergence_gaze.attention_parameters import DISABLED
 from vergence_gaze.control.perception import LATEST_FUTURE_S, Perception
 from vergence_gaze.control.report import Command, GazeReport, make_report
 from vergence_gaze.control.search_pattern import Searcher, SearchPattern
+from vergence_gaze.control.situations import progress_of, situation_of
 from vergence_gaze.control.track_requests import TrackRequests
 from vergence_gaze.estimation.mount_drift import MountDrift
 from vergence_gaze.estimation.observations import (
@@ -23,14 +24,9 @@ from vergence_gaze.estimation.observations import (
 )
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_gaze.goals.goal import Goal, GoalError, GoalKind, ObjectRequest, Result, TrackRequest
-from vergence_gaze.goals.goal_monitor import GoalMonitor, Progress
-from vergence_gaze.goals.goal_resolution import (
-    ClassRequest,
-    MotionRequest,
-    RequestedPose,
-    RequestedTarget,
-    resolve_goal,
-)
+from vergence_gaze.goals.goal_monitor import GoalMonitor
+from vergence_gaze.goals.goal_pace import pace
+from vergence_gaze.goals.goal_resolution import ClassRequest, MotionRequest, Request, RequestedPose, resolve_goal
 from vergence_gaze.joints.feedback import FeedbackMonitor
 from vergence_gaze.joints.frames import point_in_rig
 from vergence_gaze.joints.joint_reports import in_eye_angles
@@ -40,7 +36,6 @@ from vergence_gaze.laws import make_law
 from vergence_gaze.laws.protocol import ControlInput
 from vergence_gaze.parameters import GazeParameters
 from vergence_gaze.phases import Phase, PhaseMachine, Situation
-from vergence_rig.geometry import from_version_vergence
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
@@ -50,9 +45,6 @@ _LIMITED_RAD = math.radians(1.0)
 _HOLD_S = 0.3
 _CLOCK_JUMP_S = 1.0
 _UNKNOWN = np.full(3, np.nan)
-
-
-Request: TypeAlias = RequestedTarget | RequestedPose | ClassRequest | MotionRequest
 
 
 class GazeController:
@@ -152,7 +144,8 @@ class GazeController:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
         self._goals.end(Result.PREEMPTED, "preempted by a newer goal", now_s)
-        self._goal_speed_rad_s, slow_s = self._pace(goal, request)
+        history, speeds = self._perception.history, self._limits.speed_rad_s
+        self._goal_speed_rad_s, slow_s = pace(goal, request, history.reported_rad, self._driven, speeds)
         self._goals.start(goal_id, goal, now_s, self._p, slow_s)
         self._feedback.retry()
         self._activate(now_s)
@@ -186,24 +179,6 @@ class GazeController:
             raise GoalError(Result.INVALID, "the controller must be enabled: it is disabled")
         kinematics, history = self._perception.kinematics, self._perception.history
         return resolve_goal(goal, self._rig, kinematics, self._p, history, now_s, self._feedback.fault)
-
-    def _pace(self, goal: Goal, request: Request) -> tuple[float, float]:
-        """Return the largest speed of a goal [rad/s], and how much time it takes longer than at full speed [s]."""
-        if isinstance(request, (ClassRequest, MotionRequest)):
-            return goal.max_speed_rad_s, 0.0
-        if isinstance(request, RequestedPose):
-            wanted = request.joints_rad
-        else:
-            eyes = from_version_vergence(*(float(angle) for angle in request.angles_rad))
-            wanted = np.array([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad])
-        travel_rad = np.abs(np.where(self._driven, wanted - self._perception.history.reported_rad, 0.0))
-        longest_rad = float(travel_rad.max())
-        speed_rad_s = goal.max_speed_rad_s
-        if goal.min_duration_s > 0 and longest_rad > 0:
-            speed_rad_s = min(speed_rad_s, longest_rad / goal.min_duration_s)
-        full_s = float((travel_rad / self._limits.speed_rad_s).max())
-        slow_s = max(longest_rad / speed_rad_s if math.isfinite(speed_rad_s) else 0.0, goal.min_duration_s)
-        return speed_rad_s, max(slow_s - full_s, 0.0)
 
     @property
     def _speed_rad_s(self) -> Array:
@@ -451,31 +426,15 @@ class GazeController:
         )
 
     def _situation(self, state: ControlInput) -> Situation:
-        tracking, residual = self._perception.tracking, np.zeros(3)
-        has_target = tracking.filter.initialised
-        if has_target:
-            # Turning cannot reduce an error beyond the limits: it is no residual.
-            reachable = self._limits.nearest(state.shaft_rad + self._law.residual(state))
-            residual = np.where(self._driven, reachable - state.shaft_rad, 0.0)
-        lost_s = state.now_s - self._phases.since_s if self._phases.phase is Phase.LOST else 0.0
-        return Situation(
-            now_s=state.now_s,
+        return situation_of(
+            state,
+            self._perception,
+            self._phases,
+            self._law,
+            self._limits,
+            self._p,
             active=self._active,
-            has_target=has_target,
-            unseen_s=self._perception.unseen_s(state.now_s),
-            residual_rad=float(np.abs(residual).max()),
-            eyes_still=self._perception.eyes_still(state.now_s, state.commanded_rad, self._law.lands_at_rest),
-            travel_s=float((np.abs(residual) / state.speed_rad_s).max()),
-            verged=self._perception.judge.verged,
-            # Without images there is nothing to be found in them; a stream of points needs none. What moves is waited
-            # for: eyes that turn see less of it.
-            may_search=tracking.follows_stream
-            or (
-                not self._perception.images_missing(state.now_s)
-                and not tracking.awaits_motion
-                and (tracking.class_name is not None or lost_s > self._p.search.after_s)
-                and (self._attention.may_search or not self._attention.engaged)
-            ),
+            attends_and_may_search=self._attention.may_search if self._attention.engaged else None,
         )
 
     def _note_limits(self, desired: Array) -> None:
@@ -489,21 +448,7 @@ class GazeController:
         pose_reached: bool | None = None
         if self._pose is not None:
             pose_reached = self._perception.reached(self._pose) and self._perception.eyes_still(now_s, self._command)
-        progress = Progress(
-            now_s=now_s,
-            verged=self._perception.judge.verged,
-            verged_reason=self._perception.judge.reason,
-            tracking_note=self._perception.tracking.note,
-            phase=self._phases.phase,
-            in_phase_s=now_s - self._phases.since_s,
-            image_s=self._perception.image_s,
-            beyond_limits=self._beyond_limits,
-            by_class=self._perception.tracking.class_name is not None,
-            pose_reached=pose_reached,
-            ambiguity=self._perception.tracking.ambiguity,
-            images_fault=self._perception.images_fault(now_s),
-            at_point=point.reached(now_s) if (point := self._perception.tracking.point) else "",
-        )
+        progress = progress_of(now_s, self._perception, self._phases, pose_reached, self._beyond_limits)
         if self._goals.update(progress, self._p) is Result.VERGED and pose_reached:
             self._hold("the joints are at the requested angles", now_s)
 

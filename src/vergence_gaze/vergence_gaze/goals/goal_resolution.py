@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -51,6 +52,9 @@ class MotionRequest:
     """Whatever moves next."""
 
 
+Request: TypeAlias = RequestedTarget | RequestedPose | ClassRequest | MotionRequest
+
+
 def resolve_goal(
     goal: Goal,
     rig: Rig,
@@ -59,7 +63,7 @@ def resolve_goal(
     history: ShaftHistory,
     now_s: float,
     fault: str = "",
-) -> RequestedTarget | RequestedPose | ClassRequest | MotionRequest:
+) -> Request:
     """Return what a goal requests; raises GoalError (INVALID or UNREACHABLE).
 
     `fault` says why no joint is known, if none is.
