@@ -144,8 +144,8 @@ class GazeController:
             self._goals.reject(goal_id, error.result, error.reason)
             return goal_id
         self._goals.end(Result.PREEMPTED, "preempted by a newer goal", now_s)
-        history, speeds = self._perception.history, self._limits.speed_rad_s
-        self._goal_speed_rad_s, slow_s = pace(goal, request, history.reported_rad, self._driven, speeds)
+        speeds = self._limits.speed_rad_s
+        self._goal_speed_rad_s, slow_s = pace(goal, request, self._perception.history, self._driven, speeds)
         self._goals.start(goal_id, goal, now_s, self._p, slow_s)
         self._feedback.retry()
         self._activate(now_s)

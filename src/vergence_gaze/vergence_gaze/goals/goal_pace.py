@@ -7,20 +7,21 @@ import numpy.typing as npt
 
 from vergence_gaze.goals.goal import Goal
 from vergence_gaze.goals.goal_resolution import ClassRequest, MotionRequest, Request, RequestedPose
+from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_rig.geometry import from_version_vergence
 
 Array = npt.NDArray[np.float64]
 
 
 def pace(
-    goal: Goal, request: Request, joints_rad: Array, driven: npt.NDArray[np.bool_], speed_rad_s: Array
+    goal: Goal, request: Request, history: ShaftHistory, driven: npt.NDArray[np.bool_], speed_rad_s: Array
 ) -> tuple[float, float]:
     """Return the largest speed of a goal [rad/s], and how much time it takes longer than at full speed [s].
 
     Args:
         goal: what was asked for.
         request: what it means for this head.
-        joints_rad: where the joints are now (3,).
+        history: where the joints are; not read for what may be anywhere, which may be asked for before they are known.
         driven: which joints may move (3,).
         speed_rad_s: the joints' own largest speeds (3,).
     """
@@ -31,7 +32,7 @@ def pace(
     else:
         eyes = from_version_vergence(*(float(angle) for angle in request.angles_rad))
         wanted = np.array([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad])
-    travel_rad = np.abs(np.where(driven, wanted - joints_rad, 0.0))
+    travel_rad = np.abs(np.where(driven, wanted - history.reported_rad, 0.0))
     longest_rad, most_rad_s = float(travel_rad.max()), goal.max_speed_rad_s
     if goal.min_duration_s > 0 and longest_rad > 0:
         most_rad_s = min(most_rad_s, longest_rad / goal.min_duration_s)
