@@ -33,6 +33,6 @@ def test_the_demo_clicks_on_a_photograph_and_verges(tmp_path: Path) -> None:
     photo = station["photo"]
     assert photo["verged_disparity_px"] == pytest.approx(photo["disparity_px"], abs=8.0)
     report = (tmp_path / "report.html").read_text()
-    assert report.count("data:image/") == 12  # both photographs, five pictures at each moment
+    assert report.count("data:image/") == 13  # the overview, both photographs, five pictures at each moment
     for log in (tmp_path / "log").iterdir():
         assert "Traceback" not in log.read_text(), log.name
