@@ -21,7 +21,7 @@ def test_a_click_and_a_class_end_on_the_target_and_leave_their_report(domain_id:
     assert "2 of 2 stations verged" in result.stdout
     assert "of simulated time" in result.stdout
     report = (tmp_path / "report.html").read_text()
-    assert report.count("data:image/") == 20
+    assert report.count("data:image/") == 21  # the overview, and ten pictures of each station
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert [station["name"] for station in summary["stations"]] == stations
     assert 0.0 < summary["real_time_factor"] <= 1.1
