@@ -139,7 +139,7 @@ class MetricOfFaces(MetricOfPairs):
         if left_stamp_s < self._due_s:
             return seen
         self._due_s = left_stamp_s + _BOX_PERIOD_S
-        eyes = self._joints.at(round(left_stamp_s * 1e9), round(right_stamp_s * 1e9))
+        eyes = self.eyes_at(left_stamp_s, right_stamp_s)
         cameras = (self.images[0].ideal, self.images[1].ideal)
         result = self._boxes.measure(*self._ideal.draw(left, right), left_stamp_s, eyes, cameras)
         focal_px = cameras[0].fx_px

@@ -109,7 +109,7 @@ class MetricOfPairs:
         measurement, camera = self._measurement, self.images[0].ideal
         edge = measurement.edge(*self._ideal.draw(to_grey(left), to_grey(right)), self._ideal.seen_px)
         now_ns = _ns(left_stamp_s)
-        eyes = self._joints.at(now_ns, _ns(right_stamp_s))
+        eyes = self.eyes_at(left_stamp_s, right_stamp_s)
         passed = self._joints.samples_between(now_ns - _LOOK_BACK_NS, now_ns)
         track = measurement.track(edge, left_stamp_s, eyes, camera, [(ns * 1e-9, angles) for ns, angles in passed])
         angular = angular_disparity(camera, camera, track.left_px, track.disparity_px, track.vertical_px)
@@ -174,11 +174,7 @@ class Lockstep:
             self._arrive(event.due_s + JOINT_REPORT_S, [JointReport(clock_s(event.due_s), dict(report))])
             return
         publish_s = event.due_s + world.parameters.camera.latency_s
-        self._schedule.publish(event.eye, publish_s, (event.due_s, self._expose(event.eye)))
-
-    def _expose(self, eye: str) -> Callable[[], Any]:
-        """Expose an eye now; the image is made when it is published."""
-        return self.world.expose(eye)
+        self._schedule.publish(event.eye, publish_s, (event.due_s, world.expose(event.eye)))
 
     def _publish(self, eye: str, exposed_s: float, develop: Callable[[], Image]) -> None:
         self._frames[eye].append((exposed_s, develop()))
