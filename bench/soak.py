@@ -28,6 +28,7 @@ from bench.results import Row
 from vergence_bringup.ros.processes import ProcessGroup, config_dir
 from vergence_bringup.ros.simulated_head import simulated_head
 from vergence_common.domains import own_domain
+from vergence_common.goal_requests import request_goal, request_result
 from vergence_msgs.action import LookAt
 
 DURATION_S, PERIOD_S, SAMPLE_S = 3600.0, 5.0, 10.0
@@ -104,11 +105,11 @@ class Goals:
         goal = LookAt.Goal(kind=LookAt.Goal.POINT, time_limit_s=PERIOD_S - 0.5)
         goal.header.frame_id = "rig_base"
         goal.point.x, goal.point.y, goal.point.z = x, y, z
-        sent = self._client.send_goal_async(goal)
+        sent = request_goal(self.node, self._client, goal)
         self._run(sent.done, end_s)
         verged = False
         if sent.done() and sent.result().accepted:
-            ended = sent.result().get_result_async()
+            ended = request_result(self.node, sent.result())
             self._run(ended.done, end_s)
             verged = ended.done() and ended.result().result.result == LookAt.Result.VERGED
         self._run(lambda: False, end_s)

@@ -23,6 +23,7 @@ from vergence_bringup.commands.look_request import (
     result_line,
 )
 from vergence_bringup.graph_errors import GraphError
+from vergence_common.goal_requests import request_goal, request_result
 from vergence_common.start import checked_namespace, init
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import GazeGoal
@@ -93,15 +94,17 @@ class Look:
         self._wait_for_controller(wait_s)
         print(f"looking at {request.text}", flush=True)
         self._goal = _goal(request, time_limit_s)
-        self._sent = self._client.send_goal_async(self._goal, feedback_callback=self._on_feedback)
+        self._sent = request_goal(self._node, self._client, self._goal, self._on_feedback)
         handle = self._spin_until(self._sent)
         if not handle.accepted:
             print(self._rejection(), flush=True)
             return _NOT_VERGED
-        answer = self._spin_until(handle.get_result_async())
+        answer = self._spin_until(request_result(self._node, handle))
         self._progress.end()
         if answer.status == GoalStatus.STATUS_UNKNOWN:
-            raise GraphError("gaze_controller_node no longer has the goal: it was started anew meanwhile")
+            raise GraphError(
+                "gaze_controller_node does not have the goal: it rejected it, or was started anew meanwhile"
+            )
         result = answer.result
         point, frame = result.fixation_point.point, result.fixation_point.header.frame_id
         name = result_name(result.result)
@@ -131,7 +134,9 @@ class Look:
         if self._sent is None:
             return
         self._executor.spin_until_future_complete(self._sent, timeout_sec=_CANCEL_S)
-        if self._sent.done() and self._sent.result().accepted:
+        if not self._sent.done():
+            self._sent.cancel()
+        elif self._sent.result().accepted:
             cancelled = self._sent.result().cancel_goal_async()
             self._executor.spin_until_future_complete(cancelled, timeout_sec=_CANCEL_S)
 

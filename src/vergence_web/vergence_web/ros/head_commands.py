@@ -12,6 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import SetBool, Trigger
 
+from vergence_common.goal_requests import request_goal, request_result
 from vergence_common.stamps import from_nanoseconds
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import GazeGoal
@@ -40,7 +41,7 @@ class HeadCommands:
         self._look_at = ActionClient(node, LookAt, "gaze/look_at")
         self._services = ServiceCalls(node)
         self._clients = {name: self._services.client(name, kind) for kind, name, _ in _SERVICES.values()}
-        self._sent: dict[int, tuple[float, Message, Reply]] = {}
+        self._sent: dict[int, tuple[float, Any, Message, Reply]] = {}
         self._goals: dict[int, tuple[Any, Message, Reply]] = {}
         self._count = 0
         self._unexplained: deque[tuple[float, Message, Reply]] = deque()
@@ -64,9 +65,10 @@ class HeadCommands:
 
     def check(self) -> None:
         """Answer the goals whose controller has gone, and those that it has not received: nothing else will."""
-        for number, (until_s, message, reply) in list(self._sent.items()):
+        for number, (until_s, sent, message, reply) in list(self._sent.items()):
             if monotonic() > until_s:
                 del self._sent[number]
+                sent.cancel()
                 text = f"gaze/look_at has not answered within {_ACCEPTED_WITHIN_S:g} s: try again"
                 reply(Answer(message.number, False, text))
         while self._unexplained and monotonic() > self._unexplained[0][0]:
@@ -105,17 +107,15 @@ class HeadCommands:
             return
         self._count += 1
         number = self._count
-        self._sent[number] = (monotonic() + _ACCEPTED_WITHIN_S, message, reply)
-        sent = self._look_at.send_goal_async(goal)
         accepted = partial(self._on_accepted, number, message, reply)
+        sent = request_goal(self._node, self._look_at, goal)
+        self._sent[number] = (monotonic() + _ACCEPTED_WITHIN_S, sent, message, reply)
         sent.add_done_callback(answering(self._node, message, reply, accepted))
 
     def _on_accepted(self, number: int, message: Message, reply: Reply, future: Any) -> None:
-        handle = future.result()
-        if self._sent.pop(number, None) is None:  # too late: the page shows that it failed
-            if handle.accepted:
-                handle.cancel_goal_async()
+        if self._sent.pop(number, None) is None:  # given up: the page shows that it failed
             return
+        handle = future.result()
         if not handle.accepted:
             self._unexplained.append((monotonic() + _REASON_WITHIN_S, message, reply))
             if self._reasons is None:  # the reason is latched
@@ -124,7 +124,7 @@ class HeadCommands:
         self._goals[number] = (handle, message, reply)
         reply(Answer(message.number, True, "the goal is accepted", last=False))
         ended = answering(self._node, message, reply, partial(self._on_result, number))
-        handle.get_result_async().add_done_callback(ended)
+        request_result(self._node, handle).add_done_callback(ended)
 
     def _on_goal(self, report: GazeGoal) -> None:
         if report.state == GazeGoal.REJECTED and self._unexplained:
@@ -137,7 +137,13 @@ class HeadCommands:
         if message is None or reply is None:
             return
         if answer.status == GoalStatus.STATUS_UNKNOWN:
-            reply(Answer(message.number, False, f"{_GAZE} no longer has the goal: it was started anew meanwhile"))
+            reply(
+                Answer(
+                    message.number,
+                    False,
+                    f"{_GAZE} does not have the goal: it rejected it, or was started anew meanwhile",
+                )
+            )
             return
         result = answer.result
         name = _result_name(result.result)

@@ -18,6 +18,7 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
 """Executables that are looked for, in this order."""
 _STARTED_WITHIN_S, _ANSWERED_WITHIN_S = 60.0, 60.0
 _LOOK_S = 0.02
+_CLICKS, _PRESSED_WITHIN_S = 6, 5.0
 _LARGEST_MESSAGE = 256 * 1024 * 1024
 
 
@@ -89,10 +90,23 @@ class Tab:
         return box[0] + across * box[2], box[1] + down * box[3]
 
     async def click(self, selector: str, across: float = 0.5, down: float = 0.5) -> None:
-        """Click a point of an element."""
-        x, y = await self.place_of(selector, across, down)
-        for kind in ("mousePressed", "mouseReleased"):
-            await self._mouse(kind, x, y)
+        """Click a point of an element. Raises BrowserError where the element never receives it.
+
+        What is under the point may have moved since its place was asked for, and a busy browser drops a click.
+        """
+        for _ in range(_CLICKS):
+            await self.value(
+                f"document.querySelector({selector!r}).addEventListener("
+                "'pointerdown', () => { window.pressed = true; }, { once: true }); window.pressed = false"
+            )
+            x, y = await self.place_of(selector, across, down)
+            for kind in ("mousePressed", "mouseReleased"):
+                await self._mouse(kind, x, y)
+            with contextlib.suppress(BrowserError):
+                await self.wait_for("window.pressed", _PRESSED_WITHIN_S)
+                return
+        there = await self.value(f"document.elementFromPoint({x}, {y})?.outerHTML.slice(0, 200)")
+        raise BrowserError(f"{selector} receives no click at ({x:g}, {y:g}): what lies there is {there}")
 
     async def drag(self, selector: str, start: tuple[float, float], end: tuple[float, float]) -> None:
         """Drag between two points of an element, shares of its width and height."""

@@ -18,6 +18,7 @@ from sensor_msgs.msg import Image
 
 from vergence_bringup.demo.ros.timeline import Check, RealTime, SteppedTime, Timeline
 from vergence_bringup.graph_errors import GraphError
+from vergence_common.goal_requests import request_goal, request_result
 from vergence_common.images import image_to_array
 from vergence_common.qos import IMAGE_QOS, STATE_QOS
 from vergence_common.stamps import to_nanoseconds
@@ -124,12 +125,12 @@ class Recorder:
         self.time.wait_for_answer("the action gaze/look_at", self._look_at.server_is_ready, 20.0, check_alive)
         # Requests are sent in the executor's thread: rclpy discards a response that arrives before the sending thread
         # has registered the request.
-        sent = self._in_executor(lambda: self._look_at.send_goal_async(goal), check_alive)
-        handle = self._future("gaze/look_at to accept a goal", sent, 5.0, check_alive)
+        sent = self._in_executor(lambda: request_goal(self.node, self._look_at, goal), check_alive)
+        handle = self._future("gaze/look_at to accept a goal", sent, 20.0, check_alive)
         if not handle.accepted:
             raise GraphError("gaze/look_at refused the goal")
         began_s = self.now_s()
-        ended = self._in_executor(handle.get_result_async, check_alive)
+        ended = self._in_executor(lambda: request_result(self.node, handle), check_alive)
         self.wait_for("gaze/look_at to end", ended.done, timeout_s, check_alive)
         result = ended.result().result
         self.time.settle_after_goal(began_s + result.time_s, check_alive)
