@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.results import Row
+from bench.trackers_photographs import NoPhotographsError, photograph_rig, standing
 from bench.trackers_runs import stored
 from bench.trackers_scenes import SCENES, THINGS, Frame, Pose, Scene, rig, sequence
 from vergence_metric.tracking.eye_view import EyeView
@@ -17,6 +18,7 @@ from vergence_metric.tracking.motion.moving_region import FlowOf, MotionDetector
 from vergence_metric.tracking.motion.region_points import region_points
 from vergence_rig.camera import CameraModel
 from vergence_rig.kinematics import Kinematics
+from vergence_rig.rig import Rig
 
 Image = NDArray[np.uint8]
 
@@ -50,25 +52,41 @@ def motion_rows(say: Callable[[str], None]) -> list[Row]:
         rows.append(Row(f"tracker.moving_target.{name}.iou_farneback", worst, "IoU, OpenCV's Farneback"))
         median = float(np.median(off))
         rows.append(Row(f"tracker.moving_target.{name}.distance_error", median, "of the target point's distance"))
+    return rows + _rest_rows(say)
+
+
+def _rest_rows(say: Callable[[str], None]) -> list[Row]:
+    """Return the share of pairs without a mask where nothing moves, and the rate at which that is found."""
+    rows, pairs, spent_s = [], 0, 0.0
     for scene in _REST:
-        nothing, pairs, spent_s = 0, 0, 0.0
         for thing in THINGS:
             frames = list(sequence(scene, thing))
             started = time.thread_time()
             regions = _regions(frames, horn_schunck)
             spent_s += time.thread_time() - started
-            nothing += sum(region is None for region in regions[1:])
-            pairs += len(regions) - 1
-        rows.append(Row(f"tracker.moving_target.{scene.name}.no_mask", nothing / pairs, "of pairs"))
-    return [*rows, Row("tracker.moving_target.rate", pairs / spent_s, "Hz at 320x240, of CPU time")]
+            pairs += len(regions)
+            rows.append(Row(f"tracker.moving_target.{scene.name}.no_mask_{thing}", _nothing(regions), "of pairs"))
+        say(f"moving target, {scene.name}")
+    rows.append(Row("tracker.moving_target.rate", pairs / spent_s, "Hz at 320x240, of CPU time"))
+    try:
+        standing_still = [_nothing(_regions(frames, horn_schunck, photograph_rig())) for _, frames in standing()]
+    except NoPhotographsError as error:
+        say(str(error))
+        return rows
+    return [*rows, Row("tracker.moving_target.photographs.no_mask", float(np.mean(standing_still)), "of pairs")]
+
+
+def _nothing(regions: list[MovingRegion | None]) -> float:
+    """Return the share of pairs without a region; the first image has none before it."""
+    return float(np.mean([region is None for region in regions[1:]]))
 
 
 def _later(scene: Scene, by_s: float) -> Callable[[float], Pose]:
     return lambda t: scene.pose(t + by_s)
 
 
-def _regions(frames: list[Frame], flow_of: FlowOf) -> list[MovingRegion | None]:
-    detector, camera = MotionDetector(flow_of), CameraModel(rig().left_camera)
+def _regions(frames: list[Frame], flow_of: FlowOf, head: Rig | None = None) -> list[MovingRegion | None]:
+    detector, camera = MotionDetector(flow_of), CameraModel((head or rig()).left_camera)
     found = []
     for frame in frames:
         view = EyeView(camera, frame.eyes.pan_left_rad, frame.eyes.tilt_rad)

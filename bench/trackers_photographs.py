@@ -1,7 +1,10 @@
-"""The handed photographs as sequences under known homographies: a click, a saccade to it, then a sweep about it."""
+"""The handed photographs as sequences under known homographies: a click, a saccade to it, then a sweep about it.
+
+Or the eyes stand still, and only the sensors' noise changes from image to image.
+"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import cv2
 import numpy as np
@@ -13,9 +16,9 @@ from vergence_rig.rig import Rig
 from vergence_sim.optics import Lens
 from vergence_sim.photo.views import PhotoEye
 
-__all__ = ["NoPhotographsError", "photograph_rig", "sequences"]
+__all__ = ["NoPhotographsError", "photograph_rig", "sequences", "standing"]
 
-_PAIRS_USED = 12
+_PAIRS_USED, _STANDING = 12, 10
 _SACCADE, _REST, _SWEEP = 4, 12, 40  # pairs
 _ASIDE_RAD, _ABOVE_RAD = math.radians(7.0), math.radians(3.0)
 _SWEEP_RAD = math.radians(4.0)
@@ -31,13 +34,24 @@ def photograph_rig() -> Rig:
 
 def sequences(count: int = _PAIRS_USED) -> Iterator[tuple[str, list[Frame]]]:
     """Yield name and frames for one point of each of `count` pairs. Raises NoPhotographsError without photographs."""
+    for number, name in _spread(count):
+        yield name, list(_frames(name, number, range(REQUEST_FRAME + 1 + _SACCADE + _REST + _SWEEP)))
+
+
+def standing(count: int = _PAIRS_USED) -> Iterator[tuple[str, list[Frame]]]:
+    """Yield name and frames as `sequences`, of eyes that stand still."""
+    for number, name in _spread(count):
+        yield name, list(_frames(name, number, [REQUEST_FRAME + _SACCADE] * _STANDING))
+
+
+def _spread(count: int) -> Iterator[tuple[int, str]]:
     names = pair_names()
     for number in range(count):
-        name = names[number * len(names) // count]
-        yield name, list(_frames(name, number))
+        yield number, names[number * len(names) // count]
 
 
-def _frames(name: str, seed: int) -> Iterator[Frame]:
+def _frames(name: str, seed: int, poses: Iterable[int]) -> Iterator[Frame]:
+    """Yield the frames of the poses of a saccade and a sweep that are numbered."""
     rig, rng = photographs_rig(), np.random.default_rng(seed)
     pair, point = pair_of(name), targets(name, 3)[1].point
     focal_px = Lens(rig.left_camera).render_focal_px
@@ -49,7 +63,7 @@ def _frames(name: str, seed: int) -> Iterator[Frame]:
     rays = pair.rays(point)
     on = pair.fixation(point)
     side = 1.0 if point.x_px > 0.5 * pair.width_px else -1.0  # the eyes come from the middle of the picture
-    for number in range(REQUEST_FRAME + 1 + _SACCADE + _REST + _SWEEP):
+    for k, number in enumerate(poses):
         landed = min(max(number - REQUEST_FRAME, 0) / _SACCADE, 1.0)
         swept = max(number - REQUEST_FRAME - _SACCADE - _REST, 0) / _SWEEP
         aside = (1.0 - landed) * side * _ASIDE_RAD - side * _SWEEP_RAD * math.sin(2 * math.pi * swept)
@@ -67,7 +81,7 @@ def _frames(name: str, seed: int) -> Iterator[Frame]:
         x, y = places[0]
         square = np.array([(x + i * _HALF_PX, y + j * _HALF_PX) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
         yield Frame(
-            number * FRAME_S,
+            k * FRAME_S,
             images[0],
             images[1],
             (images[0], images[1]),

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from vergence_metric.boxes.detections import Box
 from vergence_metric.boxes.follow_parameters import MotionParameters
-from vergence_metric.boxes.motion import MOTION_CLASS, MotionDetector, outside_of
+from vergence_metric.boxes.motion import MOTION_CLASS, ChangeDetector, outside_of
 
 PERIOD_S = 0.1
 REST = (0.1, 0.0)
@@ -27,7 +27,7 @@ def view(column, row=200, seed=1, light=1.0, noise=2.0):
 
 def shown(images, poses=None, **parameters):
     """Return the boxes of the last image."""
-    detector, boxes = MotionDetector(MotionParameters(**parameters)), []
+    detector, boxes = ChangeDetector(MotionParameters(**parameters)), []
     for i, image in enumerate(images):
         boxes = detector.detect(image, 10.0 + PERIOD_S * i, REST if poses is None else poses[i])
     return boxes
@@ -57,7 +57,7 @@ def test_eyes_that_turn_see_no_motion():
 
 
 def test_images_with_a_gap_between_them_are_not_compared():
-    detector = MotionDetector(MotionParameters())
+    detector = ChangeDetector(MotionParameters())
     detector.detect(view(200), 10.0, REST)
     assert detector.detect(view(260), 12.0, REST) == []
     assert detector.detect(view(260), 11.0, REST) == []

@@ -89,6 +89,21 @@ def test_a_moving_board_is_masked_with_still_eyes_and_while_they_turn(stage, fol
         assert (mask & true).sum() / (mask | true).sum() > 0.6
 
 
+def test_a_bare_wall_that_a_thin_thing_has_uncovered_does_not_belong_to_it():
+    bar, detector, view = texture(14, (120, 12), (1.5, 3.0)), MotionDetector(), EyeView(CAMERA, 0.0, 0.0)
+    room, rng = texture(15, (240, 320), (2.0, 5.0)), np.random.default_rng(3)
+    room[50:190] = 110.0
+    for k in range(6):
+        image, left = room.copy(), 200 - 7 * k
+        image[60:180, left : left + 12] = bar
+        noisy = np.clip(image + rng.normal(0.0, 1.5, image.shape), 0, 255).astype(np.uint8)
+        region = detector.update(noisy, view, k * FRAME_S)
+    assert isinstance(region, MovingRegion), region
+    true = np.zeros((240, 320), bool)
+    true[60:180, left : left + 12] = True
+    assert (region.mask & true).sum() / (region.mask | true).sum() > 0.7
+
+
 def test_nothing_moves_where_only_the_eyes_do(stage):
     detector = MotionDetector()
     for k in range(8):

@@ -13,7 +13,7 @@ from vergence_metric.boxes.corner_metric import corner_metric, hidden_sides
 from vergence_metric.boxes.detections import Box, Detections
 from vergence_metric.boxes.detector import Detector
 from vergence_metric.boxes.errors import DetectorImageError
-from vergence_metric.boxes.motion import MOTION_CLASS, MotionDetector, outside_of
+from vergence_metric.boxes.motion import MOTION_CLASS, ChangeDetector, outside_of
 from vergence_metric.boxes.object_tracks import ObjectTracks
 from vergence_metric.boxes.pair_geometry import PairGeometry
 from vergence_metric.boxes.parameters import BoxMetricParameters
@@ -55,7 +55,7 @@ class BoxMeasurement:
         self._kinematics = kinematics
         self._tracks = ObjectTracks(parameters.follow)
         self._choice = TargetChoice(parameters.follow, self._tracks, frozenset({MOTION_CLASS}))
-        self._motion = MotionDetector(parameters.motion), MotionDetector(parameters.motion)
+        self._motion = ChangeDetector(parameters.motion), ChangeDetector(parameters.motion)
         self._vertical_px, self._vertical_count = 0.0, 0
         self._parameters = parameters
         self._filter = LagLimitedFilter(parameters.measurement.smoothing_lag_s)

@@ -1,4 +1,8 @@
-"""What moves before eyes at rest: regions of one eye's images that differ from the mean of the last ones."""
+"""What moves before eyes at rest: regions of one eye's images that differ from the mean of the last ones.
+
+Each image of both eyes is searched, at a detector's rate and with gaps of up to a second: `tracking/motion/` costs
+forty times as much and needs images in quick succession, but it works while the eyes turn, and gives a mask.
+"""
 
 import math
 from typing import Any
@@ -25,7 +29,7 @@ _MOST_REGIONS = 3
 _INSIDE_SHARE = 0.5  # of a moving region that lies in a detected box: the box is the better description
 
 
-class MotionDetector:
+class ChangeDetector:
     """Compares one eye's images in order of their stamps."""
 
     def __init__(self, parameters: MotionParameters) -> None:
