@@ -108,8 +108,8 @@ class MotionDetector:
 def _at_rest(now: Image, turned: Image, flow: Flow) -> Mask:
     """Return which pixels (h, w) the flow does not explain better than rest does.
 
-    Smooth flow goes on beyond what moves, where each pixel looks as if it had not moved. And what has been uncovered may
-    look like what the flow brings there: but that has not left the place it would have come from.
+    Smooth flow goes on beyond what moves, where each pixel looks as if it had not moved. And what has been uncovered
+    may look like what the flow brings there: but that has not left the place it would have come from.
     """
     rest, moved = (_difference(now, other) for other in (turned, warped(turned, flow)))
     left_behind = warped(rest, flow)
