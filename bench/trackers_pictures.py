@@ -7,11 +7,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.trackers_runs import run_tracker
+from bench.trackers_runs import model_of, run_tracker
 from bench.trackers_scenes import SCENES, Frame, rig, sequence
 from vergence_metric.disparity.cepstral import EchoWindow
-from vergence_metric.tracking.corner_cluster import CornerCluster
-from vergence_metric.tracking.modelled_tracker import ModelledTracker
+from vergence_metric.tracking.anchored_cluster import AnchoredCluster
 from vergence_metric.tracking.moving_target import MovingTarget
 from vergence_metric.tracking.protocol import Tracker
 from vergence_metric.tracking.zero_disparity_pursuit import ZeroDisparityPursuit
@@ -52,8 +51,8 @@ def _panel(kind: str, frames: list[Frame], shown: Frame) -> Picture:
     def draw(frame: Frame, tracker: Tracker) -> None:
         if frame is not shown:
             return
-        model = tracker.model if isinstance(tracker, ModelledTracker) else None
-        if isinstance(model, CornerCluster):
+        model = model_of(tracker)
+        if isinstance(model, AnchoredCluster):
             corners = model.corners
             for px, visible in zip(corners.px, corners.visible, strict=True):
                 cv2.circle(picture, _at(px), 2, _SEEN if visible else _KNOWN, -1, cv2.LINE_AA)

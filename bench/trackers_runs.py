@@ -14,9 +14,10 @@ from vergence_metric.boxes.parameters import BoxMetricParameters
 from vergence_metric.disparity import make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.shared_estimate import SharedEstimate
-from vergence_metric.tracking.corner_cluster import CornerCluster
+from vergence_metric.tracking.anchored_cluster import AnchoredCluster
 from vergence_metric.tracking.eye_view import EyeView
-from vergence_metric.tracking.modelled_tracker import ModelledTracker
+from vergence_metric.tracking.locking_tracker import LockingTracker
+from vergence_metric.tracking.modelled_follower import Followed, TargetModel
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.protocol import Tracker
 from vergence_metric.tracking.registry import make_tracker
@@ -60,8 +61,8 @@ def run_tracker(kind: str, frames: list[Frame], rig: Rig, on_pair: OnPair | None
         if number >= REQUEST_FRAME:
             places.append(track.left_px)
             disparities.append(track.disparity_px)
-            if kind == _CLUSTER and isinstance(tracker, ModelledTracker):
-                naive.add(tracker.model, frame, math.isfinite(track.left_px[0]))
+            if kind == _CLUSTER:
+                naive.add(model_of(tracker), frame, math.isfinite(track.left_px[0]))
             if on_pair is not None:
                 on_pair(frame, tracker)
     run = Run(np.array(places), np.array(disparities), 1e3 * float(np.mean(spent_s)))
@@ -86,6 +87,11 @@ def run_detector(frames: list[Frame], rig: Rig) -> Run:
     return Run(np.array(places), np.array(disparities), 1e3 * float(np.mean(spent_s[1:])))
 
 
+def model_of(tracker: Tracker) -> TargetModel | None:
+    """Return what a tracker has learnt of its target, None where that is no model."""
+    return Followed.model_of(tracker.target) if isinstance(tracker, LockingTracker) else None
+
+
 def stored(frame: Frame, camera: CameraModel) -> StoredPair:
     """Return a frame as the pair in which a point is requested."""
     pans = (frame.eyes.pan_left_rad, frame.eyes.pan_right_rad)
@@ -104,7 +110,7 @@ class _NaiveFixations:
     def add(self, model: object, frame: Frame, located: bool) -> None:
         """Add where both are in a pair."""
         centroid = nearest = (math.nan, math.nan)
-        if isinstance(model, CornerCluster) and located and model.corners.visible.any():
+        if isinstance(model, AnchoredCluster) and located and model.corners.visible.any():
             px, ids = model.corners.px[model.corners.visible], model.corners.ids[model.corners.visible]
             centroid = _pair(px.mean(axis=0))
             last = np.array(frame.left_px) if self._last is None else self._last

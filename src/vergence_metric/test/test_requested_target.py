@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from vergence_metric.alignment.alignment import Alignment
 from vergence_metric.disparity import make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
+from vergence_metric.tracking.appearance_follower import remembered_patch_tracker
 from vergence_metric.tracking.eye_view import EyeView
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_metric.tracking.request import PairMemory, StoredPair, TrackRequest
 from vergence_metric.tracking.track import TrackStatus
-from vergence_metric.tracking.tracker import TargetTracker
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, eye_position, gaze_for_point, rotation_rig_from_optical
 from vergence_rig.kinematics import Kinematics
@@ -79,7 +79,7 @@ class Stage:
     def __init__(self, **parameters):
         cv2.setRNGSeed(1)
         estimator = make_estimator(DisparityParameters())
-        self.tracker = TargetTracker(TrackerParameters(**parameters), estimator, CAMERA, Kinematics(RIG))
+        self.tracker = remembered_patch_tracker(TrackerParameters(**parameters), estimator, CAMERA, Kinematics(RIG))
         self.memory, self.stamp_s = PairMemory(1.0), 0.0
 
     def show(self, eyes, reported=None, board_m=BOARD_M):
@@ -166,7 +166,7 @@ def test_drift_is_put_right():
     stage.show(AHEAD)
     stage.ask(BOARD_M, AHEAD)
     stage.show(AHEAD)
-    target = stage.tracker._target
+    target = stage.tracker.target
     assert target is not None
     x, y = target.appearance.pixel
     target.appearance.pixel = (x + 3.0, y - 2.0)
@@ -314,7 +314,9 @@ def test_a_point_without_texture_stays_where_its_surroundings_are():
     flat = texture(4, (480, 640))
     flat[200:281, 280:361] = 128.0
     left_view, right_view = views(AHEAD)
-    tracker = TargetTracker(TrackerParameters(), make_estimator(DisparityParameters()), CAMERA, Kinematics(RIG))
+    tracker = remembered_patch_tracker(
+        TrackerParameters(), make_estimator(DisparityParameters()), CAMERA, Kinematics(RIG)
+    )
     request = TrackRequest(5, 0.0, True, (320.0, 240.0))
     first = StoredPair(0.0, with_noise(flat, 1), with_noise(flat, 2), (left_view, right_view))
     tracker.update(first.left, first.right, 0.0, AHEAD)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from vergence_metric.testing.rendered_boards import Stage, gaze, true_pixel
-from vergence_metric.tracking import corner_cluster_tracker
-from vergence_metric.tracking.modelled_tracker import ModelledTracker
+from vergence_metric.tracking import cluster_follower
+from vergence_metric.tracking.locking_tracker import LockingTracker
 from vergence_metric.tracking.registry import tracker_names
 from vergence_metric.tracking.request import TrackRequest
 from vergence_metric.tracking.track import TrackStatus
+from vergence_metric.tracking.tracked_target import Target
 from vergence_rig.geometry import EyeAngles
 
 PLACE = np.array([0.7, 0.08, 0.03])
@@ -77,7 +78,7 @@ def test_what_covers_it_is_not_followed_and_it_is_found_again(stage):
 
 @pytest.mark.parametrize("requested", [True, False])
 def test_a_target_with_too_few_corners_is_followed_by_its_appearance(monkeypatch, requested):
-    monkeypatch.setattr(corner_cluster_tracker, "_FEW", 1000)
+    monkeypatch.setattr(cluster_follower, "_FEW", 1000)
     cv2.setRNGSeed(1)
     stage = Stage("corner_cluster")
     if requested:
@@ -85,8 +86,8 @@ def test_a_target_with_too_few_corners_is_followed_by_its_appearance(monkeypatch
         ask(stage, gaze(PLACE))
     for k in range(12):
         track = stage.show(PLACE + np.array([0.0, 0.001 * k, 0.0]), gaze(PLACE))
-    assert isinstance(stage.tracker, ModelledTracker)
-    assert stage.tracker.model is None
+    assert isinstance(stage.tracker, LockingTracker)
+    assert isinstance(stage.tracker.target, Target)
     assert (track.status, track.goal_id) == (TrackStatus.OK, 5 if requested else 0), track.reason
     assert np.abs(stage.errors[-1][:2]).max() < 2.5
 

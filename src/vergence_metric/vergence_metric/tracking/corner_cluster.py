@@ -20,7 +20,7 @@ from vergence_metric.tracking.direction_filter import DirectionFilter
 from vergence_metric.tracking.eye_view import Pixel, Points
 from vergence_metric.tracking.known_corners import KnownCorners
 from vergence_metric.tracking.locking_tracker import is_inside
-from vergence_metric.tracking.modelled_tracker import Fix
+from vergence_metric.tracking.modelled_follower import Fix
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair
 from vergence_metric.tracking.requested_target import USUAL_EXTENT_PX
@@ -41,6 +41,8 @@ _UNBOUNDED_PX = 2.0 * USUAL_EXTENT_PX[0], 2.0 * USUAL_EXTENT_PX[1]  # of a targe
 _LEAST_EXTENT_PX = (40.0, 40.0)
 _MARGIN = 0.55  # of the extent, from its middle, in which corners belong
 _SURE = 12  # corners that give full confidence
+_RELOCKED = 0.5  # confidence while no corner confirms the place
+_IN_SACCADE = "the eyes are in a saccade"
 _LEAST_PARALLAX_RAD = 0.02
 
 
@@ -83,9 +85,9 @@ class CornerCluster:
             AffineCamera(np.eye(2, 3), np.array(point)),
             AffineCamera(np.array([[1.0, 0.0, -relief], [0.0, 1.0, 0.0]]), right_px),
         )
-        sigma_rad = _SIGMA_PX / pair.views[0].camera.fx_px
-        self._point = DirectionFilter(pair.views[0].angles(np.array([point])), sigma_rad)
-        self.corners = KnownCorners(sigma_rad, 0.5 * float(self._extent_px.max()))
+        self._sigma_rad = _SIGMA_PX / pair.views[0].camera.fx_px
+        self._point = DirectionFilter(pair.views[0].angles(np.array([point])), self._sigma_rad)
+        self.corners = self._no_corners()
         found = find_corners(pair.left, point, self._half_px, _MOST, _APART_PX)
         # The depth of the surface about the point, by how its disparity changes over the image; or it faces the eyes.
         slopes = np.zeros(2) if disparity.surface is None else disparity.surface.slopes[0] / relief
@@ -99,7 +101,7 @@ class CornerCluster:
         return round(min(float(reach_px), _WINDOW_PX / 2))
 
     def locate(self, pair: StoredPair, hidden_s: float, motion: EyeMotion) -> Fix | str:
-        """Return where the fixed point is in the next pair; see `modelled_tracker.TargetModel`."""
+        """Return where the fixed point is in the next pair; see `modelled_follower.TargetModel`."""
         elapsed_s, left_view, before = pair.stamp_s - self._stamp_s, pair.views[0], self._views
         hidden = hidden_s > elapsed_s + 1e-6
         self._stamp_s, self._views = pair.stamp_s, pair.views
@@ -125,12 +127,39 @@ class CornerCluster:
             return "its corners put it outside the left image"
         if motion.saccading:
             # The servos are not where they report: what the right eye sees says nothing of the distance.
-            right: _Right | str = _Right(reason="the eyes are in a saccade")
+            right: _Right | str = _Right(reason=_IN_SACCADE)
         else:
             right = self._right_eye(pair, matched.known[agree], matched.px[agree])
         if isinstance(right, str):
             return right
         return self._located(pair, matched, agree, right, hidden)
+
+    def relock(self, pair: StoredPair, place: Pixel, motion: EyeMotion) -> Fix:
+        """Learn the corners anew where the fixed point is known to be in the pair that was located last.
+
+        While its distance is not known in that pair, the corners that are known are kept.
+        """
+        left, right = self._cameras
+        left.move(np.array(place))
+        self._point.restart(np.array([0]), pair.views[0].angles(np.array([place])), np.zeros(2))
+        self._last_left_y = place[1]
+        if motion.saccading:
+            return self._fix(pair, _Right(reason=_IN_SACCADE), _RELOCKED)
+        seen = self._depth.weigh(pair, place, self._estimator)
+        if isinstance(seen, str):
+            return self._fix(pair, _Right(reason=seen), _RELOCKED)
+        across, down = seen.horizontal_px, seen.vertical_px
+        self._depth.measured(pair, place, across, down)
+        right.move(left.origin_px - (across, down))
+        known, self.corners = self.corners, self._no_corners()
+        found = find_corners(pair.left, place, self._half_px, _MOST, _APART_PX)
+        self._add_corners(pair, found, established=True)
+        if len(self.corners) < _LEAST_AGAIN:
+            self.corners = known
+        return self._fix(pair, _Right(across, down, seen.sigma_px), _RELOCKED)
+
+    def _no_corners(self) -> KnownCorners:
+        return KnownCorners(self._sigma_rad, 0.5 * float(self._extent_px.max()))
 
     def _reach_px(self, turned_px: float, hidden: bool, hidden_s: float, motion: EyeMotion) -> float:
         """Return how far all corners together may be from where they are predicted."""
@@ -214,7 +243,11 @@ class CornerCluster:
         visible = int(corners.visible.sum())
         if not right.reason and visible < _MOST:
             self._add_corners(pair, matched.found, established=False)
-        confidence = min(visible / min(_SURE, max(len(corners), 1)), 1.0)
+        return self._fix(pair, right, min(visible / min(_SURE, max(len(corners), 1)), 1.0))
+
+    def _fix(self, pair: StoredPair, right: _Right, confidence: float) -> Fix:
+        """Return where the fixed point is, by the cameras and what the right eye says."""
+        origin = self._cameras[0].origin_px
         place = (float(origin[0]), float(origin[1]))
         width, height = (self._cameras[0].scale * self._extent_px).tolist()
         candidates = self._depth.candidates(place, pair.views)

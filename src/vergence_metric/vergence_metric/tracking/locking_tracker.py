@@ -1,12 +1,11 @@
 """What every tracker shares: which target it follows. A requested one, else what lies at the fovea after a saccade.
 
 When the eyes come to rest after a saccade, the tracker locks on what lies at the left fovea. A request names the point
-to follow instead, and until the next request nothing else is tracked. How a target is learnt and found again is the
-subclasses' part.
+to follow instead, and until the next request nothing else is tracked. How a target is learnt and found again is its
+follower's part (`follower.py`).
 """
 
 import math
-from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.pairs.frame_motion import frame_motion_px
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
+from vergence_metric.tracking.follower import Follower
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.saccade_detector import EyeMotion, SaccadeDetector, StampedEyeAngles
@@ -25,14 +25,13 @@ from vergence_rig.kinematics import Kinematics
 _KEPT_SHARE = 0.9  # of a saccade: the largest distance from the fovea at which the target was not left
 
 
-class LockingTracker(ABC):
-    """Follows one target; `update` must be called with every pair, in order of their stamps.
+class LockingTracker:
+    """Follows one target; `update` must be called with every pair, in order of their stamps."""
 
-    Subclasses implement `_requested_target`, `_lock` and `_follow`, and set `_target` to None with `_lost_s` when they
-    give a target up.
-    """
-
-    def __init__(self, parameters: TrackerParameters, camera: CameraModel, kinematics: Kinematics) -> None:
+    def __init__(
+        self, follower: Follower, parameters: TrackerParameters, camera: CameraModel, kinematics: Kinematics
+    ) -> None:
+        self._follower = follower
         self._parameters = parameters
         self._camera, self._pitch_rad = camera, kinematics.pitch_rad
         self._track_id = 0
@@ -49,11 +48,16 @@ class LockingTracker(ABC):
         # Recent distances of the target from the fovea, up to the start of the current saccade: (stamp, px).
         self._distances: deque[tuple[float, float]] = deque()
 
+    @property
+    def target(self) -> Any:
+        """What the follower has learnt of the target, None without one."""
+        return self._target
+
     def request(self, request: TrackRequest, pair: StoredPair) -> None:
         """Follow a point of a stored pair from now on, on behalf of the request's goal."""
         self._track_id += 1
         self._wants_lock, self._requested = False, True
-        self._target = self._requested_target(request, pair)
+        self._target = self._follower.requested(self._track_id, request, pair)
 
     def lock_here(self) -> None:
         """Lock again on the object at the fovea as soon as the eyes are at rest, as after a saccade."""
@@ -100,24 +104,24 @@ class LockingTracker(ABC):
         self._target, self._requested = None, False
         return self._lock(pair)
 
-    @abstractmethod
-    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Any:
-        """Return the target of a request, as it is in the pair in which it was asked for; the track's id is new."""
-
-    @abstractmethod
     def _lock(self, pair: StoredPair) -> Track:
-        """Lock on what lies at the fovea: set `_target`, call `_locked`; or return why there is nothing to lock on."""
-
-    @abstractmethod
-    def _follow(self, target: Any, pair: StoredPair, motion: EyeMotion) -> Track:
-        """Return the track of the target in the next pair."""
-
-    def _locked(self) -> int:
-        """Count a new lock; returns its id."""
+        """Lock on what lies at the fovea."""
+        found = self._follower.locked(self._track_id + 1, pair)
+        if isinstance(found, str):
+            return self._untracked(TrackStatus.UNLOCKED, found)
         self._track_id += 1
         self._wants_lock = False
         self._distances.clear()
-        return self._track_id
+        self._target, track = found
+        return track
+
+    def _follow(self, target: Any, pair: StoredPair, motion: EyeMotion) -> Track:
+        """Return the track of the target in the next pair."""
+        track = self._follower.follow(target, pair, motion)
+        if isinstance(track, str):
+            self._target, self._lost_s = None, pair.stamp_s
+            return self._untracked(TrackStatus.LOST, track)
+        return track
 
     def _untracked(self, status: TrackStatus, reason: str) -> Track:
         return Track.nowhere(self._track_id, status, reason)

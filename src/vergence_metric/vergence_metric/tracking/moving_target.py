@@ -12,8 +12,8 @@ import numpy as np
 from vergence_metric.disparity.protocol import DisparityEstimator
 from vergence_metric.tracking.direction_filter import DirectionFilter
 from vergence_metric.tracking.eye_view import Pixel
-from vergence_metric.tracking.locking_tracker import is_inside
-from vergence_metric.tracking.modelled_tracker import Fix, ModelledTracker
+from vergence_metric.tracking.locking_tracker import LockingTracker, is_inside
+from vergence_metric.tracking.modelled_follower import Fix, modelled_tracker
 from vergence_metric.tracking.motion.moving_region import MotionDetector, MovingRegion
 from vergence_metric.tracking.motion.region_points import RegionPoints, region_points
 from vergence_metric.tracking.parameters import TrackerParameters
@@ -52,7 +52,7 @@ class MovingTarget:
         """Where it was in space."""
 
     def locate(self, pair: StoredPair, hidden_s: float, motion: EyeMotion) -> Fix | str:
-        """Return where what moves is in the next pair; see `modelled_tracker.TargetModel`."""
+        """Return where what moves is in the next pair; see `modelled_follower.TargetModel`."""
         elapsed_s = pair.stamp_s - self._stamp_s
         hidden, self._stamp_s = hidden_s > elapsed_s + 1e-6, pair.stamp_s
         self._center.predict(elapsed_s, coasting=hidden)
@@ -105,7 +105,7 @@ def learn_moving_target(
     parameters: TrackerParameters,
     kinematics: Kinematics,
 ) -> MovingTarget:
-    """Return what will be followed once it moves at a point of a pair; see `modelled_tracker.Learn`."""
+    """Return what will be followed once it moves at a point of a pair; see `modelled_follower.Learn`."""
     found = estimator.estimate(pair.left, pair.right, point)
     right_px = (point[0] - found.horizontal_px, point[1] - found.vertical_px)
     parallax_rad = parallax(point, pair.views, right_px) if found.ok else math.nan
@@ -114,7 +114,7 @@ def learn_moving_target(
 
 def moving_target_tracker(
     parameters: TrackerParameters, estimator: DisparityEstimator, camera: CameraModel, kinematics: Kinematics
-) -> ModelledTracker:
+) -> LockingTracker:
     """Return the tracker `moving_target`; see `protocol.Tracker`."""
     learn = partial(learn_moving_target, estimator=estimator, parameters=parameters, kinematics=kinematics)
-    return ModelledTracker(learn, estimator, parameters, camera, kinematics)
+    return modelled_tracker(learn, estimator, parameters, camera, kinematics)

@@ -38,15 +38,23 @@ class TargetDepth:
         """Why no distance is certain."""
         return self._hypotheses.doubt
 
-    def weigh(self, pair: StoredPair, point: Pixel, estimator: DisparityEstimator) -> None:
-        """Add what a pair says of the distance of the target at a point of its left image."""
-        self._add(estimator.estimate(pair.left, pair.right, point), pair, point)
+    def weigh(self, pair: StoredPair, point: Pixel, estimator: DisparityEstimator) -> Disparity | str:
+        """Add what a pair says of the distance of the target at a point of its left image.
 
-    def _add(self, disparity: Disparity, pair: StoredPair, point: Pixel) -> None:
-        self._hypotheses.update(parallax_shares(disparity, point, pair.views))
+        Returns the point's disparity if it is that of the likeliest distance, else why there is none.
+        """
+        disparity = estimator.estimate(pair.left, pair.right, point)
+        if self._add(disparity, pair, point):
+            return disparity
+        return disparity.reason or "another distance is likelier"
+
+    def _add(self, disparity: Disparity, pair: StoredPair, point: Pixel) -> bool:
+        """Weigh the hypotheses by a disparity; returns whether it is that of the likeliest one."""
+        answered = self._hypotheses.update(parallax_shares(disparity, point, pair.views))
         best = self._hypotheses.best
         if best is not None and not abs(best.parallax_rad - self.parallax_rad) <= self._apart_rad:
             self.parallax_rad = best.parallax_rad
+        return answered is not None and answered is best
 
     def measured(self, pair: StoredPair, point: Pixel, across_px: float, down_px: float) -> None:
         """Take a disparity at a point as the target's."""

@@ -13,8 +13,8 @@ import numpy as np
 from vergence_metric.disparity.protocol import DisparityEstimator
 from vergence_metric.tracking.direction_filter import DirectionFilter
 from vergence_metric.tracking.eye_view import Pixel
-from vergence_metric.tracking.locking_tracker import is_inside
-from vergence_metric.tracking.modelled_tracker import Fix, ModelledTracker
+from vergence_metric.tracking.locking_tracker import LockingTracker, is_inside
+from vergence_metric.tracking.modelled_follower import Fix, modelled_tracker
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair
 from vergence_metric.tracking.saccade_detector import EyeMotion
@@ -53,7 +53,7 @@ class ZeroDisparityPursuit:
         """The region in the last pair in which there was one."""
 
     def locate(self, pair: StoredPair, hidden_s: float, motion: EyeMotion) -> Fix | str:
-        """Return where the region's centroid is in the next pair; see `modelled_tracker.TargetModel`."""
+        """Return where the region's centroid is in the next pair; see `modelled_follower.TargetModel`."""
         elapsed_s = pair.stamp_s - self._stamp_s
         hidden, self._stamp_s = hidden_s > elapsed_s + 1e-6, pair.stamp_s
         self._center.predict(elapsed_s, coasting=hidden)
@@ -121,7 +121,7 @@ def learn_zero_disparity(
     parameters: TrackerParameters,
     baseline_m: float,
 ) -> ZeroDisparityPursuit | str:
-    """Return the region at a point's disparity, or why there is none; see `modelled_tracker.Learn`."""
+    """Return the region at a point's disparity, or why there is none; see `modelled_follower.Learn`."""
     disparity = estimator.estimate(pair.left, pair.right, point)
     if math.isnan(disparity.horizontal_px):
         return f"it has no disparity: {disparity.reason}"
@@ -134,7 +134,7 @@ def learn_zero_disparity(
 
 def zero_disparity_tracker(
     parameters: TrackerParameters, estimator: DisparityEstimator, camera: CameraModel, kinematics: Kinematics
-) -> ModelledTracker:
+) -> LockingTracker:
     """Return the tracker `zero_disparity`; see `protocol.Tracker`."""
     learn = partial(learn_zero_disparity, estimator=estimator, parameters=parameters, baseline_m=kinematics.baseline_m)
-    return ModelledTracker(learn, estimator, parameters, camera, kinematics)
+    return modelled_tracker(learn, estimator, parameters, camera, kinematics)

@@ -1,4 +1,4 @@
-"""The class-free tracker: follows what the left eye fixates from pair to pair, without a detector.
+"""Follows what the left eye fixates from pair to pair by its appearance, without a detector: `remembered_patch`.
 
 When the eyes come to rest after a saccade, the tracker locks on the object at the left fovea: its region is what shares
 the fovea's disparity (zero-disparity filter), and its appearance is learnt. From then on sparse optical flow and
@@ -12,7 +12,6 @@ found again by that (`remembered_patch.py`), whatever lies at the fovea. Until t
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -40,57 +39,49 @@ from vergence_rig.kinematics import Kinematics
 _UNMISTAKABLE_SIMILARITY = 0.8
 
 
-class TargetTracker(LockingTracker):
-    """Follows one target by its appearance; see `LockingTracker`."""
+class AppearanceFollower:
+    """Follows a target by its appearance; see `follower.Follower`."""
 
-    def __init__(
-        self,
-        parameters: TrackerParameters,
-        estimator: DisparityEstimator,
-        camera: CameraModel,
-        kinematics: Kinematics,
-    ) -> None:
-        self._estimator = estimator
-        self._segmenter = Segmenter(parameters, estimator, kinematics.baseline_m)
-        super().__init__(parameters, camera, kinematics)
+    def __init__(self, parameters: TrackerParameters, estimator: DisparityEstimator, baseline_m: float) -> None:
+        self._parameters, self._estimator = parameters, estimator
+        self._segmenter = Segmenter(parameters, estimator, baseline_m)
 
-    def _requested_target(self, request: TrackRequest, pair: StoredPair) -> Any:
-        return requested_target(self._track_id, request, pair, self._estimator, self._parameters)
+    def requested(self, track_id: int, request: TrackRequest, pair: StoredPair) -> Target:
+        """Return the target of a request."""
+        return requested_target(track_id, request, pair, self._estimator, self._parameters)
 
-    def _lock(self, pair: StoredPair) -> Track:
+    def locked(self, track_id: int, pair: StoredPair) -> tuple[Target, Track] | str:
+        """Return the target at the left fovea with its track, or why there is none."""
         left, right, stamp_s, views = pair.left, pair.right, pair.stamp_s, pair.views
         fovea = fovea_of(left)
         disparity = self._estimator.estimate(left, right, fovea)
         if disparity.status is DisparityStatus.NO_TEXTURE:
-            return self._untracked(TrackStatus.UNLOCKED, "no texture at the fovea to lock on")
+            return "no texture at the fovea to lock on"
         point, extent, disparity = self._segmenter.segment(left, right, fovea, disparity, views)
-        track_id = self._locked()
         appearance = TargetAppearance(left, point, extent or USUAL_EXTENT_PX)
         direction = views[0].direction(point)
-        self._target = Target(track_id, stamp_s, appearance, stamp_s, direction, np.zeros(3), extent is not None)
-        self._target.aside_px = offset_inside(fovea, point, extent)
-        return self._visible(self._target, Sighting(point, 1.0, 0), disparity, views)
+        target = Target(track_id, stamp_s, appearance, stamp_s, direction, np.zeros(3), extent is not None)
+        target.aside_px = offset_inside(fovea, point, extent)
+        return target, self._visible(target, Sighting(point, 1.0, 0), disparity, pair)
 
-    def _follow(self, target: Target, pair: StoredPair, motion: EyeMotion) -> Track:
+    def follow(self, target: Target, pair: StoredPair, motion: EyeMotion) -> Track | str:
+        """Return the track of a target in the next pair, or why it is given up."""
         p = self._parameters
         left, right, stamp_s, views = pair.left, pair.right, pair.stamp_s, pair.views
         hidden_s = stamp_s - target.seen_s if target.hidden else 0.0
         if hidden_s > p.give_up_s and target.patch is None:
-            self._target, self._lost_s = None, stamp_s
-            return self._untracked(TrackStatus.LOST, f"target lost: not found for {hidden_s:.1f} s")
+            return f"target lost: not found for {hidden_s:.1f} s"
         sighting = self._find(target, left, stamp_s, views)
         if sighting is None:
             target.hidden = True
-            return self._hidden(target, f"target predicted outside the left image, hidden for {hidden_s:.1f} s")
+            return _hidden(target, f"target predicted outside the left image, hidden for {hidden_s:.1f} s")
         if target.hidden:
             needed = p.reacquire_similarity if target.found else p.request_similarity
         else:
             needed = p.min_similarity
         if sighting.similarity < needed or not is_inside(sighting.pixel, left):
             target.hidden = True
-            return self._hidden(
-                target, f"target hidden for {hidden_s:.1f} s, best similarity {sighting.similarity:.2f}"
-            )
+            return _hidden(target, f"target hidden for {hidden_s:.1f} s, best similarity {sighting.similarity:.2f}")
         if target.depths is not None:
             if motion.saccading:
                 # The servos are not where they report: what the eyes pass is no evidence of where the target is.
@@ -108,7 +99,7 @@ class TargetTracker(LockingTracker):
             # Servos without feedback are off their reported angles while they move: unchanged appearance counts more.
             if abs(jump) > p.disparity_jump_px and sighting.similarity < _UNMISTAKABLE_SIMILARITY:
                 target.hidden = True
-                return self._hidden(target, f"disparity at the target's position differs by {jump:+.1f} px: occluded")
+                return _hidden(target, f"disparity at the target's position differs by {jump:+.1f} px: occluded")
         if disparity.ok and not target.bounded and target.segmentation_due():
             point, extent, disparity = self._segmenter.segment(left, right, sighting.pixel, disparity, views)
             if extent is not None:
@@ -117,10 +108,10 @@ class TargetTracker(LockingTracker):
                 sighting = replace(sighting, pixel=point)
                 target.appearance = TargetAppearance(left, point, extent)
                 target.update_direction(stamp_s, views[0].direction(point))
-                return self._visible(target, sighting, disparity, views)
+                return self._visible(target, sighting, disparity, pair)
         target.appearance.accept(left, sighting, renew=disparity.ok)
         target.update_direction(stamp_s, views[0].direction(sighting.pixel))
-        return self._visible(target, sighting, disparity, views)
+        return self._visible(target, sighting, disparity, pair)
 
     def _find(self, target: Target, left: Image, stamp_s: float, views: tuple[EyeView, EyeView]) -> Sighting | None:
         """Return the best sighting in the left image; None if it is predicted outside."""
@@ -144,16 +135,23 @@ class TargetTracker(LockingTracker):
         sightings = [target.appearance.search(left, pixel, reach) for pixel in candidates]
         return max(sightings, key=lambda one: one.similarity)
 
-    def _hidden(self, target: Target, reason: str) -> Track:
-        nowhere = Track.nowhere(self._track_id, TrackStatus.LOST, reason, target.lock_stamp_s)
-        return replace(nowhere, goal_id=target.goal_id)
-
-    def _visible(
-        self, target: Target, sighting: Sighting, disparity: Disparity, views: tuple[EyeView, EyeView]
-    ) -> Track:
+    def _visible(self, target: Target, sighting: Sighting, disparity: Disparity, pair: StoredPair) -> Track:
         """Return the track of a target that was found in the left eye."""
-        expected_px = target.expected_disparity(target.fixated_px(sighting.pixel), views)
+        expected_px = target.expected_disparity(target.fixated_px(sighting.pixel), pair.views)
         track = in_left_eye(target, sighting, disparity.reason)
         if not is_plausible(disparity, expected_px, self._parameters.disparity_jump_px):
             return track
-        return in_both_eyes(track, target, disparity, views, self._stamp_s)
+        return in_both_eyes(track, target, disparity, pair.views, pair.stamp_s)
+
+
+def _hidden(target: Target, reason: str) -> Track:
+    nowhere = Track.nowhere(target.track_id, TrackStatus.LOST, reason, target.lock_stamp_s)
+    return replace(nowhere, goal_id=target.goal_id)
+
+
+def remembered_patch_tracker(
+    parameters: TrackerParameters, estimator: DisparityEstimator, camera: CameraModel, kinematics: Kinematics
+) -> LockingTracker:
+    """Return the tracker `remembered_patch`; see `protocol.Tracker`."""
+    follower = AppearanceFollower(parameters, estimator, kinematics.baseline_m)
+    return LockingTracker(follower, parameters, camera, kinematics)
