@@ -8,7 +8,9 @@ import pytest
 
 from vergence_metric.testing.rendered_boards import Stage, gaze, true_pixel
 from vergence_metric.tracking import cluster_follower
+from vergence_metric.tracking.corner_cluster import CornerCluster
 from vergence_metric.tracking.locking_tracker import LockingTracker
+from vergence_metric.tracking.modelled_follower import Fix
 from vergence_metric.tracking.registry import tracker_names
 from vergence_metric.tracking.request import TrackRequest
 from vergence_metric.tracking.track import TrackStatus
@@ -119,3 +121,28 @@ def test_a_new_request_replaces_the_old_one(stage):
     for _ in range(8):
         free = stage.show(PLACE, gaze(PLACE))
     assert (free.status, free.goal_id) == (TrackStatus.OK, 0), free.reason
+
+
+@pytest.mark.parametrize(
+    ("off_px", "is_put_right"), [(None, True), (9.0, True), (2.0, False)], ids=["lost", "slid", "near"]
+)
+def test_corners_that_are_lost_or_have_slid_are_put_right_by_what_the_point_looks_like(
+    monkeypatch, off_px, is_put_right
+):
+    cv2.setRNGSeed(1)
+    stage = Stage("corner_cluster")
+    stage.show(PLACE, gaze(PLACE))
+    ask(stage, gaze(PLACE))
+    assert stage.show(PLACE, gaze(PLACE)).status is TrackStatus.OK
+    x, y = true_pixel(PLACE, True, gaze(PLACE))
+
+    def locate(_cluster, _pair, _hidden_s, _motion):
+        if off_px is None:
+            return "no corner is seen"
+        return Fix((x + off_px, y), 0.0, 0.0, 0.5, (60.0, 60.0), 1.0)
+
+    monkeypatch.setattr(CornerCluster, "locate", locate)
+    track = stage.show(PLACE, gaze(PLACE))
+    assert track.status is TrackStatus.OK, track.reason
+    assert abs(stage.errors[-1][0] - (0.0 if is_put_right else off_px)) < 1.0
+    assert abs(stage.errors[-1][1]) < 1.0

@@ -6,7 +6,7 @@ from vergence_metric.tracking.moving_target import moving_target_tracker
 from vergence_metric.tracking.registry import register_tracker
 from vergence_metric.tracking.zero_disparity_pursuit import zero_disparity_tracker
 
-register_tracker("corner_cluster", corner_cluster_tracker)
 register_tracker("remembered_patch", remembered_patch_tracker)
+register_tracker("corner_cluster", corner_cluster_tracker)
 register_tracker("moving_target", moving_target_tracker)
 register_tracker("zero_disparity", zero_disparity_tracker)
