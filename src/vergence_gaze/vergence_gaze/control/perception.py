@@ -34,7 +34,6 @@ from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
-Driven = npt.NDArray[np.bool_]
 
 LATEST_FUTURE_S = 1.0
 _STILL_SPEED_RAD_S = 0.2  # joints that report less are at rest
@@ -46,7 +45,7 @@ _NO_PREDICTION = Gaussian(0.0, math.inf)
 class Perception:
     """The joints' history, the target's tracking, the judge of `verged`, and the visual encoder's offset."""
 
-    def __init__(self, rig: Rig, parameters: GazeParameters, driven: Driven) -> None:
+    def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
         self._rig, self._described_steps_rad = rig, pulse_steps_rad(rig)
         self.kinematics = Kinematics(rig)
         self.mounts, self.mounts_corrected = MountDrift(), False
@@ -57,11 +56,11 @@ class Perception:
         self.contrast: ContrastSample | None = None
         self._predicted_error, self._predicted_s = _NO_PREDICTION, math.nan
         self._set_servos(rig)
-        self.configure(parameters, driven)
+        self.configure(parameters)
 
-    def configure(self, parameters: GazeParameters, driven: Driven) -> None:
-        """Start again with other parameters; `driven` (3,) says which joints may move."""
-        self._p, self._driven = parameters, driven
+    def configure(self, parameters: GazeParameters) -> None:
+        """Start again with other parameters."""
+        self._p, self._driven = parameters, parameters.control.driven
         self.history.play.learning_share = parameters.servo.play_learning
         self._moves = JointMoves(self._rig, self.history)
         self.tracking = TargetTracking(self.kinematics, parameters, self.history, self._moves)
