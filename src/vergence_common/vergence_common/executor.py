@@ -30,9 +30,9 @@ def make_executor(context: Context | None = None) -> Executor:
 def spin(executor: Executor, context: Context) -> None:
     """Run callbacks until the context is shut down.
 
-    A future that never ends gives a time limit to many callbacks at once: `spin_once` returns to Python after each, which
-    costs more than many of them. Without a limit, in rclpy 7.1.6 the events executor's own `spin` waits by spinning and
-    keeps the interpreter from all other threads.
+    A future that never ends gives a time limit to many callbacks at once: `spin_once` returns to Python after each,
+    which costs more than many of them. Without a limit, in rclpy 7.1.6 the events executor's own `spin` waits by
+    spinning and keeps the interpreter from all other threads.
     """
     try:
         while context.ok():
