@@ -185,8 +185,11 @@ class TargetFilter:
         # A depth within the gate does not contradict a direction outside it.
         self._outliers = [before for before in self._outliers if not before.same_kind(measurement)]
         advantage = rest.negative_log_likelihood - self._motion.negative_log_likelihood(motion)
+        moved = self._moving
         self._update_evidence(advantage, len(measurement.values))
-        self._update_models(measurement, motion)
+        if moved and not self._moving:
+            rest = self._rest.innovation(measurement, self._time_s)  # from its new place
+        self._update_models(measurement, rest, motion)
         return True
 
     def accept_jump(self, measurement: Measurement) -> bool:
@@ -200,7 +203,8 @@ class TargetFilter:
         self._reopen(consistent[0], measurement)
         if jumps.continues_moving(consistent[0], measurement, self._bound(measurement)):
             self._moving, self._evidence = True, _EVIDENCE_TO_MOVE
-        self._update_models(measurement, self._motion.innovations(measurement, self._time_s))
+        motion = self._motion.innovations(measurement, self._time_s)
+        self._update_models(measurement, self._rest.innovation(measurement, self._time_s), motion)
         return True
 
     def at(self, time_s: float) -> TargetEstimate:
@@ -252,10 +256,12 @@ class TargetFilter:
                 self._moving = False
                 self._copy_place_to_rest()
             return
+        self._moving = self._evidence > _EVIDENCE_SURE or (self._evidence > _EVIDENCE_TO_MOVE and self._rate_is_sure())
+
+    def _rate_is_sure(self) -> bool:
         state, covariance = self._motion.combined()
         rates, spread = state[1::2], covariance[1::2, 1::2]
-        significant = float(rates @ np.linalg.solve(spread, rates)) > _SIGNIFICANT_RATE
-        self._moving = self._evidence > (_EVIDENCE_TO_MOVE if significant else _EVIDENCE_SURE)
+        return float(rates @ np.linalg.solve(spread, rates)) > _SIGNIFICANT_RATE
 
     def _copy_place_to_rest(self) -> None:
         state, covariance = self._motion.combined()
@@ -264,9 +270,8 @@ class TargetFilter:
         self._rest.state[0::2] = state[0::2]
         self._rest.covariance[0::2, 0::2] = covariance[0::2, 0::2] + np.eye(3) * _FOLLOWING_VARIANCE
 
-    def _update_models(self, measurement: Measurement, motion: tuple[Innovation, Innovation]) -> None:
+    def _update_models(self, measurement: Measurement, rest: Innovation, motion: tuple[Innovation, Innovation]) -> None:
         self._motion.update(motion)
-        rest = self._rest.innovation(measurement, self._time_s)
         off = rest.distance / self._bound(measurement)
         if off > 1.0 and self._moving:
             # A model at rest outside its gate follows, so that it can take over when the target stops.
