@@ -81,6 +81,9 @@ class Bench:
     def mode(self) -> Mode:
         return self.head.mode
 
+    def under_way(self) -> bool:
+        return self.head.under_way
+
     def pulse_us(self, name: str) -> float | None:
         return self.wires.pulse_us(self.limits[name].calibration.channel)
 
@@ -304,11 +307,11 @@ def test_a_head_that_is_not_under_way_sends_nothing_until_the_next_command(
         bench.command(**positions_rad)
         bench.run(steps * TICK_S)
         sent = len(bench.wires.written)
-        if not bench.head.under_way:
+        if not bench.under_way():
             bench.run(0.5)
             assert len(bench.wires.written) == sent
     bench.run(5.0)
-    assert not bench.head.under_way
+    assert not bench.under_way()
 
 
 def test_a_trajectory_and_parking_are_under_way_to_their_end():
@@ -317,10 +320,10 @@ def test_a_trajectory_and_parking_are_under_way_to_their_end():
         Trajectory(["pan_left"], [TrajectoryPoint(1.0, (0.5,), None)], bench.head.sent_rad()), 100.0, 100.0
     )
     bench.run(0.9)
-    assert bench.head.under_way
+    assert bench.under_way()
     bench.run(0.5)
-    assert not bench.head.under_way
+    assert not bench.under_way()
     bench.head.park(bench.wires.now_s)
-    assert bench.head.under_way
+    assert bench.under_way()
     bench.run(2.0)
-    assert not bench.head.under_way
+    assert not bench.under_way()

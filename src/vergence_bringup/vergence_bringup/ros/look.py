@@ -5,6 +5,7 @@ import signal
 import sys
 import threading
 import time
+from collections import deque
 from typing import Any
 
 import rclpy
@@ -89,9 +90,9 @@ class Look:
         self._goal: LookAt.Goal | None = None
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._node.create_subscription(GazeGoal, "gaze/goal", self._on_goal, latched)
+        self._states: deque[GazeState] = deque(maxlen=1)
         # From the start: a subscription of the end's would be discovered too late.
-        self._node.create_subscription(GazeState, "gaze/state", self._on_state, STATE_QOS)
-        self._state: GazeState | None = None
+        self._node.create_subscription(GazeState, "gaze/state", lambda state: self._states.append(state), STATE_QOS)
         self._progress = _Progress()
 
     def at(self, request: LookRequest, time_limit_s: float, wait_s: float) -> int:
@@ -119,15 +120,14 @@ class Look:
 
     def _distance(self) -> str:
         """Return the distance of the target, with its interval, as the next gaze/state has it; "" if it is unknown."""
-        self._state, deadline_s = None, time.monotonic() + _STATE_S
-        while self._state is None:
+        self._states.clear()
+        deadline_s = time.monotonic() + _STATE_S
+        while not self._states:
             if time.monotonic() > deadline_s or not self._node.count_publishers("gaze/state"):
                 return ""
             self._spin_once()
-        return distance_text(self._state.distance_m, self._state.distance_low_m, self._state.distance_high_m)
-
-    def _on_state(self, state: GazeState) -> None:
-        self._state = state
+        state = self._states[0]
+        return distance_text(state.distance_m, state.distance_low_m, state.distance_high_m)
 
     def _rejection(self) -> str:
         """Return why the goal was rejected, as gaze/goal says right after."""
