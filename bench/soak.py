@@ -125,10 +125,7 @@ class Goals:
 
 def segments(pid: int | str) -> set[Path]:
     """Return the shared-memory segments that a process has mapped: its own, and those of the graph that it reads."""
-    try:
-        lines = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:  # it has ended
-        return set()
+    lines = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace").splitlines()
     paths = (line.split(maxsplit=5)[5] for line in lines if f"{_SHM}/fast" in line)
     return {Path(path) for path in paths if not path.endswith("(deleted)")}
 
@@ -136,6 +133,8 @@ def segments(pid: int | str) -> set[Path]:
 def run(duration_s: float) -> list[Row]:
     """Run the soak and return its rows."""
     mapped: set[Path] = set()
+    # The ports' segments are those of other graphs too, and of nodes that were killed.
+    before = set(_SHM.glob("fast*"))
     with own_domain() as domain:
         commands = simulated_head(config_dir() / "rig.yaml", simulated_time=True, **_WORLD)
         with ProcessGroup(results.OUT_DIR / "soak_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes:
@@ -149,9 +148,7 @@ def run(duration_s: float) -> list[Row]:
             mapped = segments("self").union(*(segments(nodes.pid(name)) for name in commands))
             goals.close()
             context.try_shutdown()
-    # Graphs on other domains use the ports' segments too.
-    used = set().union(*(segments(path.name) for path in Path("/proc").glob("[0-9]*")))
-    left = sum(path.exists() for path in mapped - used)
+    left = sum(path.exists() for path in mapped - before)
     for name, of_node in samples.items():
         print(
             f"   {name}: {of_node.rss_mb[0]:.0f} to {of_node.rss_mb[-1]:.0f} MB, {of_node.slope_mb_h():+.1f} MB/h, "
