@@ -133,6 +133,8 @@ def segments(pid: int | str) -> set[Path]:
 def run(duration_s: float) -> list[Row]:
     """Run the soak and return its rows."""
     mapped: set[Path] = set()
+    # The ports' segments are those of other graphs too, and of nodes that were killed.
+    before = set(_SHM.glob("fast*"))
     with own_domain() as domain:
         commands = simulated_head(config_dir() / "rig.yaml", simulated_time=True, **_WORLD)
         with ProcessGroup(results.OUT_DIR / "soak_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes:
@@ -146,7 +148,7 @@ def run(duration_s: float) -> list[Row]:
             mapped = segments("self").union(*(segments(nodes.pid(name)) for name in commands))
             goals.close()
             context.try_shutdown()
-    left = sum(path.exists() for path in mapped)
+    left = sum(path.exists() for path in mapped - before)
     for name, of_node in samples.items():
         print(
             f"   {name}: {of_node.rss_mb[0]:.0f} to {of_node.rss_mb[-1]:.0f} MB, {of_node.slope_mb_h():+.1f} MB/h, "

@@ -15,14 +15,14 @@ class TwoRates:
         self._periods_ns = {True: round(1e9 * fast_s), False: round(1e9 * slow_s)}
         self.fast = True
         """Which period it has."""
-        self._timer = node.create_timer(fast_s, callback, clock=clock)
+        self.timer = node.create_timer(fast_s, callback, clock=clock)
 
     def set_fast(self, fast: bool) -> bool:
         """Use this period from now on; return whether it was the other one. The shorter begins at once."""
         if fast is self.fast:
             return False
         self.fast = fast
-        self._timer.timer_period_ns = self._periods_ns[fast]
+        self.timer.timer_period_ns = self._periods_ns[fast]
         if fast:
-            self._timer.reset()
+            self.timer.reset()
         return True
