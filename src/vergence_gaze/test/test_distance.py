@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vergence_gaze.estimation.distance import joint_variances, target_position
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig

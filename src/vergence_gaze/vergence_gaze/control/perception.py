@@ -21,7 +21,7 @@ from vergence_gaze.estimation.observations import (
     PointSighting,
     TrackSighting,
 )
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.estimation.tracking import SightingError, TargetTracking
 from vergence_gaze.estimation.vergence_offset import VergenceOffset, farthest_offset_rad
 from vergence_gaze.estimation.visual_error import ContrastSample

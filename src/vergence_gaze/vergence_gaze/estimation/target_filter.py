@@ -5,8 +5,6 @@ jump looks like an outlier until a second measurement is consistent with it.
 """
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +13,10 @@ from vergence_gaze.estimation import jump_detector as jumps
 from vergence_gaze.estimation.imm_filter import ImmFilter
 from vergence_gaze.estimation.jump_detector import RATE_SIGMA_RAD_S
 from vergence_gaze.estimation.kalman import TILT, VERGENCE, VERSION, Innovation, KalmanFilter, Measurement
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 
 Array = npt.NDArray[np.float64]
 
-_TO_JOINTS = np.array([[1.0, -0.5, 0.0], [1.0, 0.5, 0.0], [0.0, 0.0, 1.0]])
 _EVIDENCE_FADE = 0.8
 _EVIDENCE_TO_MOVE = 7.0
 _EVIDENCE_TO_REST = -2.0
@@ -36,56 +34,6 @@ _COMPARABLE_S = 0.5
 _MINIMUM_WEIGHT = 0.3
 _FOLLOWING_VARIANCE = 1e-5
 _KEPT_ESTIMATES = 8
-
-
-def joints_of(angles_rad: Array) -> Array:
-    """Return pan_left, pan_right, tilt (3,) for version, vergence, tilt (3,)."""
-    return np.asarray(_TO_JOINTS @ angles_rad, np.float64)
-
-
-@dataclass(frozen=True)
-class TargetEstimate:
-    """The target at one time: angles that fixate it (3,) [rad], rates (3,) [rad/s], covariance of the angles (3, 3)."""
-
-    angles_rad: Array
-    rates_rad_s: Array
-    covariance: Array
-    moving: bool
-
-    @property
-    def version_rad(self) -> float:
-        """Version that fixates the target."""
-        return float(self.angles_rad[0])
-
-    @property
-    def vergence_rad(self) -> float:
-        """Vergence that fixates the target."""
-        return float(self.angles_rad[1])
-
-    @property
-    def tilt_rad(self) -> float:
-        """Tilt that fixates the target."""
-        return float(self.angles_rad[2])
-
-    @cached_property
-    def joints_rad(self) -> Array:
-        """Joint angles (3,), pan_left, pan_right, tilt, that fixate the target."""
-        return joints_of(self.angles_rad)
-
-    @property
-    def joint_rates_rad_s(self) -> Array:
-        """How fast each joint (3,) turns while it follows the target."""
-        return _TO_JOINTS @ self.rates_rad_s
-
-    @cached_property
-    def joint_sigmas_rad(self) -> Array:
-        """Standard deviations (3,) of the joint angles that fixate the target."""
-        return np.sqrt(np.diag(_TO_JOINTS @ self.covariance @ _TO_JOINTS.T))
-
-    @property
-    def sigmas_rad(self) -> Array:
-        """Standard deviations of the angles (3,)."""
-        return np.sqrt(np.diag(self.covariance))
 
 
 class TargetFilter:
