@@ -379,7 +379,7 @@ def test_a_request_is_answered_with_its_goals_id(graph: Any, node: EdgeMetricNod
     requests = graph.client.create_publisher(TrackRequest, "vergence/track_request", 10)
     graph.wait_until(lambda: requests.get_subscription_count() > 0, "the node subscribes to requests")
     eyes.describe()
-    graph.wait_until(lambda: all(node._stereo.models), "the cameras are known")
+    graph.wait_until(lambda: all(node._stereo.cameras.models), "the cameras are known")
 
     def publish_joints() -> None:
         stamp = from_nanoseconds(eyes.stamp_ns + 33 * MS)
