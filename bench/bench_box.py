@@ -18,9 +18,10 @@ from vergence_metric.boxes.association import associate
 from vergence_metric.boxes.pair_geometry import PairGeometry
 from vergence_metric.boxes.parameters import BoxMetricParameters
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import EyeAngles, from_version_vergence, gaze_for_point
+from vergence_rig.geometry import EyeAngles, from_version_vergence
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 from vergence_sim.heads import rolled_head
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator, StereoFrame

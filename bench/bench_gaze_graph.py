@@ -15,7 +15,8 @@ from bench import gaze_runs
 from bench import gaze_scenarios as scenarios
 from bench.gaze_figures import STEADY_FROM_S, StaticFigures, onset_s, quantile, steady_error_deg
 from bench.gaze_graph_head import SERVO, TARGET, ProcessHead, open_head
-from bench.gaze_runs import Realism, Scenario, Setting, Trace
+from bench.gaze_runs import Realism, Scenario, Setting
+from bench.gaze_trace import Trace
 from bench.heads import identify, joints_of
 from bench.results import Row
 from vergence_bringup.ros.simulated_head import BOX_RATE_HZ, FRAME_RATE_HZ

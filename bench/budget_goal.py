@@ -11,6 +11,7 @@ from rclpy.node import Node
 from vergence_msgs.action import LookAt
 
 WITHIN_S = 30.0
+_AGAIN_S = 0.5
 
 
 def main() -> int:
@@ -25,12 +26,15 @@ def main() -> int:
 
 
 def _looks(node: Node, client: Any, end_s: float) -> bool:
-    """Send the goal until it is not refused: a controller that has just started knows no joints yet."""
+    """Send the goal until it is not refused: a controller that has just started has no joint states yet."""
     while time.monotonic() < end_s:
         sent = client.send_goal_async(LookAt.Goal(kind=LookAt.Goal.PIXEL, eye=0, left_x_px=319.5, left_y_px=239.5))
         rclpy.spin_until_future_complete(node, sent, timeout_sec=end_s - time.monotonic())
-        if not (sent.done() and sent.result().accepted):
+        if not sent.done():
             return False
+        if not sent.result().accepted:
+            time.sleep(_AGAIN_S)
+            continue
         ended = sent.result().get_result_async()
         rclpy.spin_until_future_complete(node, ended, timeout_sec=1.0)
         if not (ended.done() and ended.result().result.result == LookAt.Result.INVALID):

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_rig.geometry import gaze_for_point
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
 from vergence_sim.truth import Truth

@@ -9,7 +9,8 @@ import numpy as np
 from bench import gaze_runs
 from bench import gaze_scenarios as scenarios
 from bench.encoder_readings import DrawnFeatures
-from bench.gaze_runs import SERVOS, Scenario, Setting, Trace, tolerance_deg
+from bench.gaze_runs import SERVOS, Scenario, Setting, tolerance_deg
+from bench.gaze_trace import Trace
 from bench.results import Row
 
 DEFAULT = Setting()

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from sensor_msgs.msg import JointState
 
-from bench.gaze_runs import Scenario, Trace, travel_s
+from bench.gaze_runs import Scenario, travel_s
+from bench.gaze_trace import Trace
 from bench.heads import identified, simulated
 from bench.results import OUT_DIR
 from vergence_bringup.demo.ros.recorder import Recorder, Stamped

@@ -9,7 +9,8 @@ import numpy as np
 
 from bench import gaze_runs
 from bench import gaze_scenarios as scenarios
-from bench.gaze_runs import Scenario, Setting, Trace
+from bench.gaze_runs import Scenario, Setting
+from bench.gaze_trace import Trace
 from bench.heads import identify
 
 matplotlib.use("Agg")

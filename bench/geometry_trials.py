@@ -163,7 +163,7 @@ def run(trial: GeometryTrial) -> GeometryOutcome:
         lockstep = Lockstep(simulator, rig)
         moment_s = float(random.uniform(0.0, 1.0 / simulator.parameters.camera.frame_rate_hz))
         lockstep.advance_to(simulator.time_s + AWAKE_S + moment_s)
-        watch = _Watch(simulator, point_m, lockstep.metric.images)
+        watch = _Watch(simulator, point_m, lockstep.images)
         trace = record(lockstep, PointOfRoom(simulator, point_m), DURATION_S, REST_S, watch)
         return GeometryOutcome(
             trial,

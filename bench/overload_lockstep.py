@@ -6,7 +6,7 @@ late by a period now and then.
 
 from typing import Any
 
-from bench.photos_lockstep import CONTROL_PERIOD_S, PROCESSING_S, Image, Lockstep, clock_s
+from bench.photos_lockstep import CONTROL_PERIOD_S, PROCESSING_S, Image, Lockstep, pair_of
 from vergence_rig.rig import Rig
 from vergence_sim.world import EYES, World
 
@@ -42,7 +42,7 @@ class OverloadedLockstep(Lockstep):
         assert self._newest is not None
         (left_s, left), (right_s, right) = self._newest
         self._newest = None
-        seen = self.metric.observe(left, right, clock_s(left_s), clock_s(right_s))
+        seen = self.metric.observe(pair_of(left, right, left_s, right_s))
         self._free_s = now_s + self._measuring_s
         self._arrive(now_s + max(self._measuring_s, PROCESSING_S), seen, left_s)
 

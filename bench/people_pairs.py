@@ -12,7 +12,8 @@ from vergence_metric.boxes.detections import Box
 from vergence_metric.boxes.parameters import AssociationParameters
 from vergence_metric.testing.face_panels import FacePanel, FacePicture, PanelView
 from vergence_metric.testing.face_pictures import astronaut, small_faces
-from vergence_rig.geometry import EyeAngles, gaze_for_point
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 VIEWS = 1000
 _MISSED = 0.15

@@ -16,14 +16,17 @@ from std_msgs.msg import Header
 
 from bench.heads import joints_of, simulated
 from bench.photos_data import photographs_rig
-from bench.photos_lockstep import CONTROL_PERIOD_S, Image, Lockstep, MetricOfPairs, clock_s
+from bench.photos_lockstep import CONTROL_PERIOD_S, Image, Lockstep, calibrated, clock_s
 from bench.results import Row
+from vergence.pair_metric import PairMetric
 from vergence_common.stamps import to_stamp
 from vergence_gaze.estimation.observations import Observation
 from vergence_gaze.goals.goal import Goal, GoalKind
 from vergence_gaze.ros import gaze_messages
 from vergence_metric.boxes import BoxMeasurement, Detector
 from vergence_metric.boxes.parameters import BoxMetricParameters, DetectorParameters
+from vergence_metric.measurement.parameters import PairMeasurementParameters
+from vergence_metric.pairs.pairing import Pair
 from vergence_metric.ros.box_messages import box_vergence_message
 from vergence_metric.testing.face_panels import FacePanel, PanelView
 from vergence_metric.testing.face_pictures import astronaut
@@ -124,26 +127,24 @@ def _with_camera(rig: Rig, camera: CameraSpec) -> Rig:
     return replace(rig, left_camera=camera, right_camera=camera)
 
 
-class MetricOfFaces(MetricOfPairs):
+class MetricOfFaces(PairMetric):
     """The tracker on every pair and the detector on one in a while, as both metric nodes send them."""
 
     def __init__(self, rig: Rig, world: PhotoWorld, detector: Detector) -> None:
-        super().__init__(rig, world.calibrations)
+        super().__init__(rig, calibrated(world), PairMeasurementParameters())
         parameters = BoxMetricParameters(detector=DetectorParameters(model=str(detector.path)))
         self._boxes = BoxMeasurement(parameters, Kinematics(rig), detector)
         self._due_s = -math.inf
 
-    def observe(self, left: Image, right: Image, left_stamp_s: float, right_stamp_s: float) -> list[Observation]:
-        """See MetricOfPairs."""
-        seen = super().observe(left, right, left_stamp_s, right_stamp_s)
-        if left_stamp_s < self._due_s:
+    def observe(self, pair: Pair[Image]) -> list[Observation]:
+        """See PairMetric."""
+        seen, stamp_s = super().observe(pair), pair.left_stamp_ns * 1e-9
+        if stamp_s < self._due_s or self.images is None:
             return seen
-        self._due_s = left_stamp_s + _BOX_PERIOD_S
-        eyes = self.eyes_at(left_stamp_s, right_stamp_s)
+        self._due_s = stamp_s + _BOX_PERIOD_S
         cameras = (self.images[0].ideal, self.images[1].ideal)
-        result = self._boxes.measure(*self._ideal.draw(left, right), left_stamp_s, eyes, cameras)
+        drawn = self.ideal.draw(pair.left, pair.right)
+        result = self._boxes.measure(*drawn, stamp_s, self.eyes_at(pair), cameras)
         focal_px = cameras[0].fx_px
-        message = box_vergence_message(
-            result, Header(stamp=to_stamp(left_stamp_s)), right_stamp_s - left_stamp_s, focal_px
-        )
+        message = box_vergence_message(result, Header(stamp=to_stamp(stamp_s)), pair.skew_ns * 1e-9, focal_px)
         return [*seen, gaze_messages.box_sighting(message, focal_px)]

@@ -1,38 +1,31 @@
 """The shipped metric and controller before any lockstep world, in simulated time: no nodes, no sleeping.
 
 Images, joint reports and results take as long as through the running nodes: `camera.latency_s` from an exposure to its
-publication, `processing_s` for the metric, 2 ms for a joint report. What passes between metric and controller goes
-through the same messages as between their nodes.
+publication, `processing_s` for the metric, 2 ms for a joint report.
 """
 
 import heapq
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from std_msgs.msg import Header
 
-from vergence_common.stamps import to_stamp
+from vergence.body import JointAngles
+from vergence.pair_metric import PairMetric
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import JointReport, Observation
-from vergence_gaze.goals.goal import Goal, GoalKind, TrackRequest
+from vergence_gaze.goals.goal import Goal, GoalKind
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.parameters import GazeParameters
-from vergence_gaze.ros import gaze_messages
-from vergence_metric.disparity.angular_disparity import angular_disparity
-from vergence_metric.edges.edges import to_grey
-from vergence_metric.measurement.pair_measurement import PairMeasurement
 from vergence_metric.measurement.parameters import PairMeasurementParameters
-from vergence_metric.pairs.ideal_images import IdealImages
-from vergence_metric.ros.track_messages import track_message, track_request
+from vergence_metric.pairs.pairing import Pair
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import EyeAngles
-from vergence_rig.joint_history import JointHistory
-from vergence_rig.rig import JOINT_NAMES, CameraSpec, Rig
+from vergence_rig.eye_image import eye_images
+from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_sim.real_time import Schedule
 from vergence_sim.world import EYES, World
 
@@ -42,7 +35,6 @@ Image = npt.NDArray[np.uint8]
 CONTROL_PERIOD_S = 0.02
 PROCESSING_S = 0.030
 JOINT_REPORT_S = 0.002
-_LOOK_BACK_NS = 500_000_000
 _CLOCK_START_S = 100.0
 """Time 0 of the world on the clock of the stamps: a stamp of zero would mean "none"."""
 
@@ -76,58 +68,17 @@ class Clickable(Protocol):
         """Return how much vergence, version and tilt are short of it now [rad]."""
 
 
-class MetricOfPairs:
-    """edge_metric_node's work on a pair, as the observations that gaze_controller_node makes of its messages."""
-
-    def __init__(self, rig: Rig, calibrations: Mapping[str, CameraSpec | None]) -> None:
-        self._rig = rig
-        self._measurement = PairMeasurement(PairMeasurementParameters(), rig)
-        # Without a calibration the nodes take rig.yaml's cameras.
-        left, right = (CameraModel(calibrations[eye] or rig.camera(eye == "left")) for eye in EYES)
-        self._ideal = IdealImages(rig)
-        self.images = self._ideal.set_cameras((left, right))
-        """Both eyes' images, as their camera_info and the rig describe them."""
-        self._joints = JointHistory()
-
-    def on_joints(self, stamp_s: float, angles_rad: Mapping[str, float]) -> None:
-        """Keep a joint report."""
-        angles = self._rig.eye_angles([angles_rad[name] for name in JOINT_NAMES])
-        self._joints.add(_ns(stamp_s), JOINT_NAMES, angles)
-
-    def eyes_at(self, left_stamp_s: float, right_stamp_s: float) -> EyeAngles | None:
-        """Return the reported eye angles at a pair's stamps, None if they are not known."""
-        return self._joints.at(_ns(left_stamp_s), _ns(right_stamp_s))
-
-    def on_request(self, request: TrackRequest) -> None:
-        """Pass the controller's request on to the tracker; it takes effect at the next pair, as in the node."""
-        self._measurement.request_track(track_request(gaze_messages.track_request(request, self.images), self.images))
-
-    def observe(self, left: Image, right: Image, left_stamp_s: float, right_stamp_s: float) -> list[Observation]:
-        """Measure a pair and return what the controller receives of it."""
-        header = Header(stamp=to_stamp(left_stamp_s))
-        skew_s = right_stamp_s - left_stamp_s
-        measurement, camera = self._measurement, self.images[0].ideal
-        edge = measurement.edge(*self._ideal.draw(to_grey(left), to_grey(right)), self._ideal.seen_px)
-        now_ns = _ns(left_stamp_s)
-        eyes = self.eyes_at(left_stamp_s, right_stamp_s)
-        passed = self._joints.samples_between(now_ns - _LOOK_BACK_NS, now_ns)
-        track = measurement.track(edge, left_stamp_s, eyes, camera, [(ns * 1e-9, angles) for ns, angles in passed])
-        angular = angular_disparity(camera, camera, track.left_px, track.disparity_px, track.vertical_px)
-        tracked = track_message(track, edge, angular, self.images, header, skew_s)
-        measurement.update_alignment()
-        return [
-            gaze_messages.track_contrast(tracked),
-            gaze_messages.track_sighting(tracked, self.images[0]),
-        ]
-
-
 class Lockstep:
     """World, metric and controller on one clock. `advance_to` lets all of them run; `on_step` sees every command."""
 
     def __init__(self, world: World, rig: Rig, parameters: GazeParameters | None = None) -> None:
         self.world = world
         self.controller = GazeController(rig, parameters or gaze_parameters(), CONTROL_PERIOD_S)
-        self.metric = MetricOfPairs(rig, world.calibrations)
+        # Without a calibration the nodes take rig.yaml's cameras.
+        left, right = (CameraModel(world.calibrations[eye] or rig.camera(eye == "left")) for eye in EYES)
+        self.images = eye_images(rig, (left, right))
+        """Both eyes' images, as their camera_info and the rig describe them."""
+        self.metric = metric_of(rig, world)
         self.on_step: Callable[[Any], None] = lambda command: None
         self.newest_exposure_s = -math.inf
         """When the left image of the newest pair that was measured was exposed."""
@@ -151,7 +102,7 @@ class Lockstep:
 
     def click(self, pixel: tuple[float, float]) -> int:
         """Ask the controller to look at a pixel (x, y) of the newest left image that was published."""
-        x, y = self.metric.images[0].undistort([pixel])[0]
+        x, y = self.images[0].undistort([pixel])[0]
         goal = Goal(
             GoalKind.PIXEL,
             left_eye=True,
@@ -170,7 +121,9 @@ class Lockstep:
         world.advance_to(event.due_s)
         if event.kind == "joints":
             report = world.joint_states()
-            self.metric.on_joints(clock_s(event.due_s), report)
+            self.metric.add_joints(
+                JointAngles(_ns(clock_s(event.due_s)), np.array([report[name] for name in JOINT_NAMES]))
+            )
             self._arrive(event.due_s + JOINT_REPORT_S, [JointReport(clock_s(event.due_s), dict(report))])
             return
         publish_s = event.due_s + world.parameters.camera.latency_s
@@ -183,7 +136,7 @@ class Lockstep:
         if not all(self._frames.values()):
             return
         (left_s, left), (right_s, right) = (self._frames[e].pop(0) for e in EYES)
-        seen = self.metric.observe(left, right, clock_s(left_s), clock_s(right_s))
+        seen = self.metric.observe(pair_of(left, right, left_s, right_s))
         published_s = max(left_s, right_s) + self.world.parameters.camera.latency_s
         self._arrive(published_s + PROCESSING_S, seen, left_s)
 
@@ -199,7 +152,7 @@ class Lockstep:
             self.newest_exposure_s = max(self.newest_exposure_s, exposed_s)
         command = self.controller.step(clock_s(now_s), arrived)
         if command.track_request is not None:
-            self.metric.on_request(command.track_request)
+            self.metric.request_track(command.track_request)
         if command.joints_rad is not None:
             self.world.command(dict(zip(JOINT_NAMES, command.joints_rad.tolist(), strict=True)), now_s)
         self.on_step(command)
@@ -241,6 +194,22 @@ def record(
     while world.time_s < began_s + duration_s - 1e-9 and world.time_s - began_s - verged_since_s < rest_s:
         lockstep.advance_to(world.time_s + CONTROL_PERIOD_S)
     return trace
+
+
+def metric_of(rig: Rig, world: World) -> PairMetric:
+    """Return the metric with its parameters as shipped, for the cameras of a world."""
+    return PairMetric(rig, calibrated(world), PairMeasurementParameters())
+
+
+def calibrated(world: World) -> tuple[CameraModel | None, CameraModel | None]:
+    """Return the cameras of a world, None for one that is not calibrated."""
+    left, right = (world.calibrations[eye] for eye in EYES)
+    return None if left is None else CameraModel(left), None if right is None else CameraModel(right)
+
+
+def pair_of(left: Image, right: Image, left_s: float, right_s: float) -> Pair[Image]:
+    """Return a pair of images that were exposed at these times of the world [s]."""
+    return Pair(left, right, _ns(clock_s(left_s)), _ns(clock_s(right_s)))
 
 
 def clock_s(world_s: float) -> float:

@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vergence_rig.geometry import EyeAngles, gaze_for_point
+from vergence_rig.geometry import EyeAngles
 from vergence_rig.rig import Rig
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 from vergence_sim.parameters import SimParameters
 from vergence_sim.scene import BOX_SIDES_M, CUBE_SIDE_M, MARKER_LENGTH_M, MARKER_RADIUS_M
 from vergence_sim.simulator import Simulator

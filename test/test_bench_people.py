@@ -16,7 +16,7 @@ from vergence_metric.boxes.parameters import DetectorParameters
 from vergence_metric.testing.face_panels import FacePanel, PanelView
 from vergence_metric.testing.face_pictures import astronaut
 from vergence_metric.testing.onnx_face_matcher import build_face_matcher
-from vergence_rig.geometry import gaze_for_point
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from std_msgs.msg import Header
 
 from vergence.body import Pixels
+from vergence.pair_metric import track_sighting
 from vergence.testing.wall_body import WallBody
-from vergence.vision import track_sighting
 from vergence_common.stamps import to_stamp
 from vergence_gaze.ros import gaze_messages
 from vergence_metric.disparity.angular_disparity import angular_disparity

@@ -10,8 +10,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from training.scenes import View
-from vergence_rig.geometry import EyeAngles, from_version_vergence, gaze_for_point
+from vergence_rig.geometry import EyeAngles, from_version_vergence
 from vergence_rig.rig import default_rig
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 from vergence_sim.parameters import SimParameters
 from vergence_sim.simulator import Simulator
 from vergence_sim.truth import TrueBox

@@ -106,7 +106,7 @@ def test_a_face_is_looked_at_between_its_eyes(graph: Any, tmp_path: Path) -> Non
     assert "face" in graph.wait(graph.message(DetectorClasses, "vergence/detector_classes", qos=latched)).names
     eyes = Eyes(graph)
     eyes.describe()
-    graph.wait_until(lambda: all(node._stereo.models), "the cameras are known")
+    graph.wait_until(lambda: all(node._stereo.cameras.models), "the cameras are known")
     eyes.turn(START_NS + 100 * MS)
     graph.wait_until(lambda: node._joints.known, "the joints are known")
     message = answer(graph, node, eyes, scene(64), scene(48))
@@ -138,7 +138,7 @@ def test_a_pair_gives_metric_ii_with_the_left_stamp(graph: Any, node: BoxMetricN
 def test_with_cameras_and_joints_it_is_placed_in_space(graph: Any, node: BoxMetricNode) -> None:
     eyes = Eyes(graph)
     eyes.describe()
-    graph.wait_until(lambda: all(node._stereo.models), "the cameras are known")
+    graph.wait_until(lambda: all(node._stereo.cameras.models), "the cameras are known")
     eyes.turn(START_NS + 100 * MS)
     graph.wait_until(lambda: node._joints.known, "the joints are known")
     future = graph.message(PoseWithCovarianceStamped, "vergence/target_point")

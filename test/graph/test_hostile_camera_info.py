@@ -37,12 +37,12 @@ def test_a_metric_node_names_the_camera_and_goes_on(graph: Any, kind: Any) -> No
     publisher = graph.client.create_publisher(CameraInfo, "right/camera_info", 10)
     graph.wait_until(publisher.get_subscription_count, "the node to subscribe")
     for focal, d in HOSTILE:
-        node._stereo._info_errors[1] = None
+        node._stereo.cameras._info_errors[1] = None
         publisher.publish(_info(focal, d))
         status = graph.diagnostic("cameras", lambda status: status.message.startswith("right/camera_info: "))
         assert " must be " in status.message
     publisher.publish(_info(539.0, PLAIN))
-    graph.wait_until(lambda: node._stereo.models[1] is not None, "a calibration to be taken")
+    graph.wait_until(lambda: node._stereo.cameras.models[1] is not None, "a calibration to be taken")
 
 
 def test_the_controller_keeps_its_cameras(graph: Any, monkeypatch: pytest.MonkeyPatch) -> None:

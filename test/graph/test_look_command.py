@@ -1,5 +1,6 @@
 """`vergence look` as a process, against an action server of the test's own."""
 
+import math
 import signal
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import GazeGoal
+from vergence_msgs.msg import GazeGoal, GazeState
 
 from .conftest import Graph
 
@@ -81,6 +82,16 @@ def test_the_exit_status_says_whether_it_verged(graph: Graph, result: int, statu
     assert "(0.750, 0.000, 0.000) m" in out
     (goal,) = controller.goals
     assert (goal.kind, goal.eye, goal.left_x_px, goal.left_y_px) == (LookAt.Goal.PIXEL, 0, 412.0, 230.0)
+
+
+def test_the_targets_distance_is_printed_with_its_interval(graph: Graph) -> None:
+    Controller(graph.client, LookAt.Result.VERGED)
+    states = graph.client.create_publisher(GazeState, "gaze/state", 10)
+    state = GazeState(distance_m=72.0, distance_low_m=1.25, distance_high_m=math.inf)
+    graph.client.create_timer(0.02, lambda: states.publish(state))
+    code, out, err = ended(graph, look("--pixel", "412", "230"))
+    assert (code, err) == (0, "")
+    assert out.splitlines()[-1].endswith("72.00 m (1.25 to inf m)")
 
 
 def test_a_point_in_a_frame_and_a_namespace(graph: Graph) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from vergence_gaze.goals.goal import TrackRequest
-from vergence_gaze.ros import gaze_messages as convert
+from vergence_gaze.ros import look_at_messages as convert
+from vergence_gaze.ros.gaze_messages import track_request
 from vergence_msgs.action import LookAt
 from vergence_rig.camera import CameraModel
 from vergence_rig.eye_image import eye_images
@@ -23,7 +24,7 @@ def goal(width_px: float, height_px: float, eye: int = LookAt.Goal.EYE_LEFT) -> 
 @pytest.mark.parametrize("eye", [LookAt.Goal.EYE_LEFT, LookAt.Goal.EYE_RIGHT])
 def test_the_size_of_a_goal_is_that_of_the_request(eye: int) -> None:
     extent_rad = convert.goal(goal(60.0, 40.0, eye), NOWHERE, *IMAGES).extent_rad
-    asked = convert.track_request(TrackRequest(1, 2.0, eye == 0, (0.0, 0.0), extent_rad), IMAGES)
+    asked = track_request(TrackRequest(1, 2.0, eye == 0, (0.0, 0.0), extent_rad), IMAGES)
     assert (asked.width_px, asked.height_px) == pytest.approx((60.0, 40.0))
 
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vergence_rig.geometry import gaze_for_point
 from vergence_rig.rig import default_rig
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 

@@ -74,4 +74,7 @@ def test_the_lines_show_figures_and_a_dash_for_what_is_not_known():
     assert line == "verge    to turn: version +0.12, vergence -1.50, tilt - deg; contrast -"
     line = result_line("VERGED", 0.83, "", (0.6, 0.05, 0.0), "", math.radians(6))
     assert line == "VERGED after 0.83 s\nthe eyes look at (0.600, 0.050, 0.000) m in rig_base, vergence 6.00 deg"
+    assert result_line("VERGED", 0.83, "", (0.6, 0.05, 0.0), "", 0.1, "0.60 m (0.50 to inf m)").endswith(
+        " deg\nthe target's distance, with its interval of 95 %: 0.60 m (0.50 to inf m)"
+    )
     assert result_line("LOST", 2.0, "no track", (math.nan,) * 3, "", math.nan) == "LOST after 2.00 s: no track"

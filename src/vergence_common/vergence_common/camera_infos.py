@@ -8,8 +8,7 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo
 
 from vergence_common.qos import STATE_QOS, QosWatch
-
-_STAMP_END = 12  # bytes of the encapsulation (4) and of the header's stamp (8), with which a CDR message begins
+from vergence_common.stamps import STAMP_END
 
 
 def subscribe_camera_info(
@@ -23,8 +22,8 @@ def subscribe_camera_info(
 
     def on_message(sent: bytes) -> None:
         nonlocal before
-        if sent[_STAMP_END:] != before:
-            before = sent[_STAMP_END:]
+        if sent[STAMP_END:] != before:
+            before = sent[STAMP_END:]
             on_change(deserialize_message(sent, CameraInfo))
 
     return watch.create_subscription(CameraInfo, topic, on_message, qos, serialised=True)

@@ -9,6 +9,7 @@ import os
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
+from rclpy.task import Future
 
 VARIABLE = "VERGENCE_EXECUTOR"
 _LONGEST_WAIT_S = 1.0
@@ -29,11 +30,12 @@ def make_executor(context: Context | None = None) -> Executor:
 def spin(executor: Executor, context: Context) -> None:
     """Run callbacks until the context is shut down.
 
-    Never without a time limit: in rclpy 7.1.6 the events executor's own `spin` waits by spinning and keeps the
-    interpreter from all other threads.
+    A future that never ends gives a time limit to many callbacks at once: `spin_once` returns to Python after each,
+    which costs more than many of them. Without a limit, in rclpy 7.1.6 the events executor's own `spin` waits by
+    spinning and keeps the interpreter from all other threads.
     """
     try:
         while context.ok():
-            executor.spin_once(timeout_sec=_LONGEST_WAIT_S)
+            executor.spin_until_future_complete(Future(), timeout_sec=_LONGEST_WAIT_S)
     except ExternalShutdownException:
         return

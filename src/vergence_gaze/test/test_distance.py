@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from vergence_gaze.estimation.distance import joint_variances, target_position
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
-from vergence_rig.geometry import gaze_for_point
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 RIG = default_rig()
 HEAD = Kinematics(RIG)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vergence_gaze.estimation.exposures import Exposures, positive_sigma
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_rig.rig import JOINT_NAMES, default_rig

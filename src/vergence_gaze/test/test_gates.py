@@ -22,7 +22,7 @@ from vergence_gaze.estimation.gates import (
 )
 from vergence_gaze.estimation.kalman import Measurement
 from vergence_gaze.estimation.observations import BoxSighting, PointSighting, TrackSighting
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.estimation.tracking import TargetTracking
 from vergence_gaze.goals.requested_point import RequestedPoint
 from vergence_gaze.joints.joint_moves import JointMoves

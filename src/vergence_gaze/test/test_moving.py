@@ -14,9 +14,9 @@ from vergence_gaze.goals.goal import Goal, GoalKind
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.phases import Phase
 from vergence_gaze.testing.fake_head import TICK_S, FakeHead, VisionModel
-from vergence_rig.geometry import gaze_for_point
 from vergence_rig.rig import default_rig
 from vergence_rig.servo import IDEAL, MG995, SG90, ServoSpec
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 CONTROL_TICKS = 6
 FRAME_RATE = VisionModel(

@@ -8,9 +8,9 @@ from vergence_gaze.estimation.observations import Observation
 from vergence_gaze.goals.goal import Goal, GoalKind, Outcome, Result
 from vergence_gaze.parameter_groups import gaze_parameters
 from vergence_gaze.testing.fake_head import TICK_S, FakeHead, VisionModel
-from vergence_rig.geometry import gaze_for_point
 from vergence_rig.rig import default_rig
 from vergence_rig.servo import IDEAL
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 RIG = default_rig().with_servos(IDEAL)
 POINT = (0.4, 0.0, 0.0)

@@ -6,6 +6,9 @@ Default angles have 17 digits so that the YAML equals them exactly.
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy as np
+import numpy.typing as npt
+
 from vergence_gaze.attention_parameters import AttentionParameters
 from vergence_gaze.law_registry import law_names
 from vergence_gaze.target_parameters import TargetParameters
@@ -76,6 +79,11 @@ class ControlParameters(Parameters):
         minimum=0.1,
         maximum=600,
     )
+
+    @property
+    def driven(self) -> npt.NDArray[np.bool_]:
+        """Which joints (3,) may move: pan_left, pan_right, tilt."""
+        return np.array([self.mode != "left_held", self.mode != "right_held", self.tilt_enabled])
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,10 @@ from vergence_metric.boxes.pair_geometry import PairGeometry
 from vergence_metric.boxes.parameters import AssociationParameters
 from vergence_metric.boxes.patch_descriptor import descriptor_correlation, patch_descriptor
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import EyeAngles, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.geometry import EyeAngles, rotation_rig_from_optical
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 P = AssociationParameters()
 CUT_LEFT, CUT_TOP, CUT_RIGHT, CUT_BOTTOM = ((i == 0, i == 1, i == 2, i == 3) for i in range(4))

@@ -11,9 +11,10 @@ from vergence_metric.boxes.parameters import BoxMeasurementParameters, BoxMetric
 from vergence_metric.boxes.smoothing import LagLimitedFilter, smoothed_pair
 from vergence_metric.boxes.target_point import locate
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import EyeAngles, gaze_for_point
+from vergence_rig.geometry import EyeAngles
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 RIG = default_rig()
 HEAD = Kinematics(RIG)

@@ -16,9 +16,10 @@ from vergence_metric.boxes.refinement import refine
 from vergence_metric.boxes.smoothing import LagLimitedFilter
 from vergence_metric.boxes.target_point import locate
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import EyeAngles, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.geometry import EyeAngles, rotation_rig_from_optical
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 CAMERAS = (CameraModel(default_rig().left_camera), CameraModel(default_rig().right_camera))
 BASELINE_M = 0.065

@@ -11,7 +11,8 @@ from vergence_metric.boxes.face_pairing import face_cost
 from vergence_metric.boxes.parameters import AssociationParameters
 from vergence_metric.boxes.patch_descriptor import descriptor_correlation, patch_descriptor
 from vergence_metric.testing.face_panels import FacePanel, FacePicture, PanelView
-from vergence_rig.geometry import EyeAngles, gaze_for_point
+from vergence_rig.geometry import EyeAngles
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 
 P = AssociationParameters()
 BASELINE_M = PanelView().rig.baseline_m

@@ -18,9 +18,10 @@ from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_metric.tracking.request import PairMemory, StoredPair, TrackRequest
 from vergence_metric.tracking.track import TrackStatus
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import EyeAngles, eye_position, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.geometry import EyeAngles, rotation_rig_from_optical
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
+from vergence_rig.testing.ideal_eyes import eye_position, gaze_for_point
 
 RIG = default_rig()
 CAMERA = CameraModel(RIG.left_camera)

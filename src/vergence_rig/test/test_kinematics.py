@@ -13,6 +13,7 @@ from vergence_rig import geometry as g
 from vergence_rig.kinematics import FarPoint, Kinematics
 from vergence_rig.rig import Rig, RigError, default_rig
 from vergence_rig.rig_file import rig_as_mapping, rig_from_mapping
+from vergence_rig.testing import ideal_eyes
 from vergence_rig.testing.odd_heads import SHARES, odd_head
 
 _STEP = 1e-6
@@ -88,7 +89,7 @@ def test_a_head_without_offsets_has_the_formulas_of_ideal_eyes(
     point: tuple[float, float, float], baseline_m: float
 ) -> None:
     k = Kinematics(Rig(baseline_m=baseline_m))
-    eyes, ideal = k.gaze_for_point(point), g.gaze_for_point(point, baseline_m)
+    eyes, ideal = k.gaze_for_point(point), ideal_eyes.gaze_for_point(point, baseline_m)
     assert [eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad] == pytest.approx(
         [ideal.pan_left_rad, ideal.pan_right_rad, ideal.tilt_rad], abs=1e-10
     )

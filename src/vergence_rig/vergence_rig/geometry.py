@@ -74,11 +74,6 @@ def from_version_vergence(version_rad: float, vergence_rad: float, tilt_rad: flo
     return EyeAngles(version_rad - 0.5 * vergence_rad, version_rad + 0.5 * vergence_rad, tilt_rad)
 
 
-def eye_position(left: bool, baseline_m: float) -> Array:
-    """Return an eye's centre in rig_base (3,) [m]; tilting does not move it."""
-    return np.array([0.0, 0.5 * baseline_m if left else -0.5 * baseline_m, 0.0])
-
-
 def eye_direction(pan_rad: float, tilt_rad: float) -> Array:
     """Return the unit optical axis in rig_base (3,) of an eye at these angles [rad]."""
     cos_pan = math.cos(pan_rad)
@@ -107,31 +102,6 @@ def rotation_rig_from_optical(pan_rad: float, tilt_rad: float, pitch_rad: float 
     return (turned @ rotation_rig_from_eye(0.0, pitch_rad) if pitch_rad else turned) @ ROTATION_EYE_FROM_OPTICAL
 
 
-def angles_of_direction(direction: Any) -> tuple[float, float]:
-    """Return (pan_rad, tilt_rad) of a direction (3,) in rig_base; it need not be a unit vector.
-
-    Raises UnreachableError for one along the baseline, where tilt is undefined, or one that is zero or not finite.
-    """
-    x, y, z = (float(value) for value in direction)
-    forward = math.hypot(x, z)
-    if not (math.isfinite(forward) and math.isfinite(y)) or forward <= 1e-12 * abs(y) or forward == 0.0:
-        raise UnreachableError(f"direction must be finite and not along the baseline: got ({x:g}, {y:g}, {z:g})")
-    return math.atan2(y, forward), math.atan2(-z, x)
-
-
-def gaze_for_point(point_m: Any, baseline_m: float) -> EyeAngles:
-    """Return the angles that turn both axes through a point (3,) in rig_base [m].
-
-    Raises UnreachableError for a point on the line through both eyes, or one that is not finite.
-    """
-    x, y, z = (float(value) for value in point_m)
-    forward = math.hypot(x, z)
-    if not (math.isfinite(forward) and math.isfinite(y)) or forward <= 1e-9:
-        raise UnreachableError(f"point must be finite and off the baseline's line: got ({x:g}, {y:g}, {z:g}) m")
-    half = 0.5 * baseline_m
-    return EyeAngles(math.atan2(y - half, forward), math.atan2(y + half, forward), math.atan2(-z, x))
-
-
 def point_at(version_rad: float, vergence_rad: float, tilt_rad: float, baseline_m: float) -> Array:
     """Return the point (3,) in rig_base [m] that both axes pass through; the inverse of `gaze_for_point`.
 
@@ -147,12 +117,6 @@ def point_at(version_rad: float, vergence_rad: float, tilt_rad: float, baseline_
     forward = baseline_m * cos_left * cos_right / math.sin(vergence_rad)
     lateral = forward * math.tan(pan_left) + 0.5 * baseline_m
     return np.array([forward * math.cos(tilt_rad), lateral, -forward * math.sin(tilt_rad)])
-
-
-def fixation_point(eye_angles: EyeAngles, baseline_m: float) -> Fixation:
-    """Return where the axes of ideally mounted eyes meet; raises ParallelAxesError or DivergingAxesError."""
-    point_m = point_at(eye_angles.version_rad, eye_angles.vergence_rad, eye_angles.tilt_rad, baseline_m)
-    return Fixation(point_m, 0.0)
 
 
 def nearest_points_of_rays(origin_a: Any, direction_a: Any, origin_b: Any, direction_b: Any) -> tuple[Array, Array]:

@@ -81,6 +81,9 @@ class Bench:
     def mode(self) -> Mode:
         return self.head.mode
 
+    def under_way(self) -> bool:
+        return self.head.under_way
+
     def pulse_us(self, name: str) -> float | None:
         return self.wires.pulse_us(self.limits[name].calibration.channel)
 
@@ -284,3 +287,43 @@ def test_no_history_makes_the_head_send_an_unsafe_pulse(
             way_rad = abs(limits.calibration.joint_rad(pulse_us) - limits.calibration.joint_rad(before_us))
             assert way_rad <= limits.max_speed_rad_s * max(at_s - before_s, 0.0) + 1e-9
         last[channel] = (at_s, pulse_us)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    commands=st.lists(
+        st.dictionaries(st.sampled_from(["pan_left", "pan_right", "tilt"]), st.floats(-1.5, 1.5), min_size=1),
+        min_size=1,
+        max_size=5,
+    ),
+    resolution_us=st.sampled_from([0.02, 1.0, 4.88, 5.0]),
+    steps=st.integers(0, 30),
+)
+def test_a_head_that_is_not_under_way_sends_nothing_until_the_next_command(
+    commands: list[dict[str, float]], resolution_us: float, steps: int
+):
+    bench = Bench(resolution_us, command_timeout_s=60.0, stagger_s=0.02)
+    for positions_rad in commands:
+        bench.command(**positions_rad)
+        bench.run(steps * TICK_S)
+        sent = len(bench.wires.written)
+        if not bench.under_way():
+            bench.run(0.5)
+            assert len(bench.wires.written) == sent
+    bench.run(5.0)
+    assert not bench.under_way()
+
+
+def test_a_trajectory_and_parking_are_under_way_to_their_end():
+    bench = Bench(command_timeout_s=0.2)
+    bench.head.follow(
+        Trajectory(["pan_left"], [TrajectoryPoint(1.0, (0.5,), None)], bench.head.sent_rad()), 100.0, 100.0
+    )
+    bench.run(0.9)
+    assert bench.under_way()
+    bench.run(0.5)
+    assert not bench.under_way()
+    bench.head.park(bench.wires.now_s)
+    assert bench.under_way()
+    bench.run(2.0)
+    assert not bench.under_way()

@@ -106,9 +106,15 @@ class ServoChannel:
         elif now_s - self._working_since_s > self._wait_s:
             self._wait_s = self.retry.first_s
 
+    def under_way(self, wanted_rad: float) -> bool:
+        """Return whether it is yet to start, or to send more pulses on the way to `wanted_rad` [rad]; failed: no."""
+        if self.state is not ChannelState.PULSING:
+            return self.state is ChannelState.RELEASED
+        return self._goal_us(wanted_rad) != self._pulse_us
+
     def arrived(self, wanted_rad: float) -> bool:
         """Return whether the pulse sent is the one nearest to `wanted_rad` [rad] that may be sent."""
-        goal_us = safe_pulse_us(wanted_rad, self._pulse_us, 1e9, self.limits, self._driver.resolution_us)
+        goal_us = self._goal_us(wanted_rad)
         near_us = 1.001 * self._driver.resolution_us
         return abs(goal_us - self._pulse_us) <= near_us and abs(self._way_us(wanted_rad)) <= near_us
 
@@ -120,6 +126,10 @@ class ServoChannel:
             self._failed(error, now_s)
             return
         self.state = ChannelState.RELEASED
+
+    def _goal_us(self, wanted_rad: float) -> float:
+        """Return the pulse that would be sent if the servo could travel for as long as it needs."""
+        return safe_pulse_us(wanted_rad, self._pulse_us, 1e9, self.limits, self._driver.resolution_us)
 
     def _way_us(self, wanted_rad: float) -> float:
         wanted_us = self.limits.calibration.pulse_us(wanted_rad)

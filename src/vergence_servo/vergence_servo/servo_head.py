@@ -191,9 +191,16 @@ class ServoHead:
         return all(channel.state is ChannelState.FAILED or channel.arrived(wanted) for channel, wanted in commanded)
 
     @property
-    def moving(self) -> bool:
-        """True while commands, a trajectory or parking may change what is sent from one step to the next."""
+    def commanded(self) -> bool:
+        """True while commands, a trajectory or parking say where the servos are to be."""
         return self.mode in (Mode.COMMANDED, Mode.PARKING)
+
+    @property
+    def under_way(self) -> bool:
+        """True while the next step may send something else than the last one, without another command."""
+        if self._trajectory is not None or self.mode is Mode.PARKING:
+            return True
+        return any(self.channels[name].under_way(wanted_rad) for name, wanted_rad in self._wanted_rad.items())
 
     @property
     def pulsing(self) -> bool:

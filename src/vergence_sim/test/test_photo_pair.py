@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from vergence_rig.geometry import gaze_for_point
 from vergence_rig.rig import JOINT_NAMES, CameraSpec
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 from vergence_sim.photo.pair import PhotoError, PhotoPair, PhotoPoint, read_pair
 
 GREY = np.full((240, 320, 3), 90, np.uint8)

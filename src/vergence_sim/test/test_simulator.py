@@ -7,9 +7,9 @@ import operator
 import numpy as np
 import pytest
 
-from vergence_rig.geometry import gaze_for_point
 from vergence_rig.parameters import ParameterError, renamed
 from vergence_rig.rig import EyeMount, default_rig
+from vergence_rig.testing.ideal_eyes import gaze_for_point
 from vergence_sim.head import CommandError
 from vergence_sim.heads import ideal_head
 from vergence_sim.parameters import GROUPS, SimParameters

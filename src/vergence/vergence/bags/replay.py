@@ -12,7 +12,8 @@ import numpy as np
 from vergence.bags.reader import HeadBag, RecordedMetric
 from vergence.bags.writer import BagError
 from vergence.body import JointAngles
-from vergence.vision import Measurement, Vision
+from vergence.pair_metric import Measurement
+from vergence.vision import Vision
 from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.tracking.request import TrackRequest
 from vergence_rig.rig import Rig
@@ -50,18 +51,19 @@ class PairFigures:
 def replayed(bag: HeadBag, rig: Rig, parameters: PairMeasurementParameters) -> Iterator[PairFigures]:
     """Measure every pair of a recording, in order. Raises ValueError where a camera is described nowhere."""
     vision, measured_ns = Vision(rig, bag.cameras(), parameters), -1
+    metric = vision.metric
     for arrival_ns, event in bag.events():
         if isinstance(event, JointAngles):
-            vision.add_joints(event)
+            metric.add_joints(event)
             continue
         if isinstance(event, TrackRequest):
-            vision.request_pixel(event)
+            metric.request_pixel(event)
             continue
         vision.add_picture(event, arrival_ns)
         vision.observe(arrival_ns)
-        pair, found = vision.newest, None
+        pair, found = metric.newest, None
         if pair is not None and pair.left_stamp_ns != measured_ns:
-            measured_ns, found = pair.left_stamp_ns, vision.measurement()
+            measured_ns, found = pair.left_stamp_ns, metric.measurement()
         if found is not None:
             yield _figures(measured_ns, found)
 

@@ -103,15 +103,23 @@ def feedback_line(phase: str, residuals_deg: tuple[float, float, float], contras
 
 
 def result_line(
-    name: str, time_s: float, reason: str, fixation_m: tuple[float, float, float], frame: str, vergence_rad: float
+    name: str,
+    time_s: float,
+    reason: str,
+    fixation_m: tuple[float, float, float],
+    frame: str,
+    vergence_rad: float,
+    distance: str = "",
 ) -> str:
-    """Return the line of a result: its name, the reason, and where the eyes look."""
+    """Return the line of a result: its name, the reason, where the eyes look, and the target's distance in words."""
     because = f": {reason}" if reason else ""
     place = ""
     if all(map(math.isfinite, fixation_m)):
         x, y, z = fixation_m
         degrees = _figure(math.degrees(vergence_rad), ".2f")
         place = f"\nthe eyes look at ({x:.3f}, {y:.3f}, {z:.3f}) m in {frame or 'rig_base'}, vergence {degrees} deg"
+    if distance:
+        place += f"\nthe target's distance, with its interval of 95 %: {distance}"
     return f"{name} after {time_s:.2f} s{because}{place}"
 
 

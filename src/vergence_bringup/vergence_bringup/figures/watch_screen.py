@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from vergence_bringup.figures.distance_text import distance_text
 from vergence_rig.stream import Stream
 
 _STALE_S = 1.0
@@ -59,9 +60,7 @@ class Screen:
             (style, f"  version {_degrees(state.version_rad)}  vergence {_degrees(state.vergence_rad)}"),
             (style, f"  tilt {_degrees(state.tilt_rad)}   residuals {' '.join(_degrees(r) for r in residuals)}"),
         )
-        far = "inf" if math.isinf(state.distance_high_m) else f"{state.distance_high_m:.2f}"
-        reach = f"{state.distance_m:.2f} m ({state.distance_low_m:.2f} to {far})"
-        yield ((style, f"  distance {reach}  law {state.law}  mode {state.mode}"),)
+        yield ((style, f"  distance {_reach(state) or '-'}  law {state.law}  mode {state.mode}"),)
 
     def _metric(self, snapshot: Snapshot) -> Iterator[tuple[tuple[str, str], ...]]:
         edge, error = snapshot.streams["vergence/edge"].message, snapshot.streams["vergence/error"].message
@@ -84,7 +83,7 @@ class Screen:
             )
         box = snapshot.streams["vergence/box"].message
         if box is not None:
-            found = f"{box.class_name or 'no target'} {_figure(box.center_horizontal_px)} px{_distance(box)}"
+            found = f"{box.class_name or 'no target'} {_figure(box.center_horizontal_px)} px  {_reach(box)}".rstrip()
             found = f"{found}  {box.reason}"
             yield (("warn" if box.status else "", f"  boxes {found}"),)
 
@@ -147,11 +146,8 @@ def _degrees(angle_rad: float) -> str:
     return "    -    " if not math.isfinite(angle_rad) else f"{math.degrees(angle_rad):+7.2f}°"
 
 
-def _distance(box: Any) -> str:
-    """Return the distance of a detected target with its interval of 95 %; "" where it is not known."""
-    if not box.distance_m > 0.0:
-        return ""
-    return f"  {box.distance_m:.2f} m ({box.distance_low_m:.2f} to {box.distance_high_m:.2f} m)"
+def _reach(message: Any) -> str:
+    return distance_text(message.distance_m, message.distance_low_m, message.distance_high_m)
 
 
 def _figure(value: float) -> str:

@@ -5,6 +5,7 @@ import signal
 import sys
 import threading
 import time
+from collections import deque
 from typing import Any
 
 import rclpy
@@ -22,16 +23,18 @@ from vergence_bringup.commands.look_request import (
     look_request,
     result_line,
 )
+from vergence_bringup.figures.distance_text import distance_text
 from vergence_bringup.graph_errors import GraphError
 from vergence_common.goal_requests import request_goal, request_result
+from vergence_common.qos import STATE_QOS
 from vergence_common.start import checked_namespace, init
 from vergence_msgs.action import LookAt
-from vergence_msgs.msg import GazeGoal
+from vergence_msgs.msg import GazeGoal, GazeState
 
 __all__ = ["add_arguments", "run"]
 
 _NOT_VERGED, _INTERRUPTED = 1, 130
-_CANCEL_S, _SLICE_S, _REASON_S = 5.0, 0.1, 2.0
+_CANCEL_S, _SLICE_S, _REASON_S, _STATE_S = 5.0, 0.1, 2.0, 1.0
 _ASKED = (
     "kind",
     "point",
@@ -87,6 +90,9 @@ class Look:
         self._goal: LookAt.Goal | None = None
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._node.create_subscription(GazeGoal, "gaze/goal", self._on_goal, latched)
+        self._states: deque[GazeState] = deque(maxlen=1)
+        # From the start: a subscription of the end's would be discovered too late.
+        self._node.create_subscription(GazeState, "gaze/state", lambda state: self._states.append(state), STATE_QOS)
         self._progress = _Progress()
 
     def at(self, request: LookRequest, time_limit_s: float, wait_s: float) -> int:
@@ -108,9 +114,20 @@ class Look:
         result = answer.result
         point, frame = result.fixation_point.point, result.fixation_point.header.frame_id
         name = result_name(result.result)
-        place = (point.x, point.y, point.z)
-        print(result_line(name, result.time_s, result.reason, place, frame, result.vergence_rad), flush=True)
+        place, distance = (point.x, point.y, point.z), self._distance()
+        print(result_line(name, result.time_s, result.reason, place, frame, result.vergence_rad, distance), flush=True)
         return 0 if result.result == LookAt.Result.VERGED else _NOT_VERGED
+
+    def _distance(self) -> str:
+        """Return the distance of the target, with its interval, as the next gaze/state has it; "" if it is unknown."""
+        self._states.clear()
+        deadline_s = time.monotonic() + _STATE_S
+        while not self._states:
+            if time.monotonic() > deadline_s or not self._node.count_publishers("gaze/state"):
+                return ""
+            self._spin_once()
+        state = self._states[0]
+        return distance_text(state.distance_m, state.distance_low_m, state.distance_high_m)
 
     def _rejection(self) -> str:
         """Return why the goal was rejected, as gaze/goal says right after."""

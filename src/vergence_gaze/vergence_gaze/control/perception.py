@@ -1,7 +1,7 @@
 """The controller's state estimate: observations in; joints, target and `verged` out. It commands nothing."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import copy
 from functools import partial
 
@@ -21,7 +21,7 @@ from vergence_gaze.estimation.observations import (
     PointSighting,
     TrackSighting,
 )
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.estimation.tracking import SightingError, TargetTracking
 from vergence_gaze.estimation.vergence_offset import VergenceOffset, farthest_offset_rad
 from vergence_gaze.estimation.visual_error import ContrastSample
@@ -34,7 +34,6 @@ from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
-Driven = npt.NDArray[np.bool_]
 
 LATEST_FUTURE_S = 1.0
 _STILL_SPEED_RAD_S = 0.2  # joints that report less are at rest
@@ -46,7 +45,7 @@ _NO_PREDICTION = Gaussian(0.0, math.inf)
 class Perception:
     """The joints' history, the target's tracking, the judge of `verged`, and the visual encoder's offset."""
 
-    def __init__(self, rig: Rig, parameters: GazeParameters, driven: Driven) -> None:
+    def __init__(self, rig: Rig, parameters: GazeParameters) -> None:
         self._rig, self._described_steps_rad = rig, pulse_steps_rad(rig)
         self.kinematics = Kinematics(rig)
         self.mounts, self.mounts_corrected = MountDrift(), False
@@ -57,11 +56,11 @@ class Perception:
         self.contrast: ContrastSample | None = None
         self._predicted_error, self._predicted_s = _NO_PREDICTION, math.nan
         self._set_servos(rig)
-        self.configure(parameters, driven)
+        self.configure(parameters)
 
-    def configure(self, parameters: GazeParameters, driven: Driven) -> None:
-        """Start again with other parameters; `driven` (3,) says which joints may move."""
-        self._p, self._driven = parameters, driven
+    def configure(self, parameters: GazeParameters) -> None:
+        """Start again with other parameters."""
+        self._p, self._driven = parameters, parameters.control.driven
         self.history.play.learning_share = parameters.servo.play_learning
         self._moves = JointMoves(self._rig, self.history)
         self.tracking = TargetTracking(self.kinematics, parameters, self.history, self._moves)
@@ -194,7 +193,7 @@ class Perception:
 
     def _update_contrast(self, seen: EdgeContrast, now_s: float, law: Law, verging: bool) -> None:
         self.judge.update_contrast(seen.stamp_s, seen.contrast, now_s)
-        if not (math.isfinite(seen.stamp_s) and self.history.covers(seen.stamp_s)):
+        if not (law.unsigned and math.isfinite(seen.stamp_s) and self.history.covers(seen.stamp_s)):
             return
         if self.contrast is not None and seen.stamp_s <= self.contrast.stamp_s:
             return
@@ -203,7 +202,7 @@ class Perception:
         self.contrast = ContrastSample(
             seen.stamp_s, seen.contrast, seen.metric_px, float(joints[1] - joints[0]), resting
         )
-        if law.unsigned and resting and self.tracking.filter.initialised:
+        if resting and self.tracking.filter.initialised:
             self.judge.update_pair(seen.stamp_s, now_s, law.remaining_rad(), True, verging)
 
     def _predict_error(self, stamp_s: float) -> None:
@@ -235,33 +234,44 @@ class Perception:
         seen_error = 0.0 if by_point else float(visual.error_rad[1] - visual.error_rad[0])
         error = max(abs(vergence_error), abs(seen_error) if math.isfinite(seen_error) else 0.0)
         direction_error = max((value for value in measured if math.isfinite(value)), default=0.0)
+        self.judge.update_target(stamp_s, error, direction_error)
+        steady, probability = self._is_steady(estimate, stamp_s, now_s), 1.0
+        # A target that moves, or may move, can be elsewhere by now: there one pair is never enough.
+        if self.tracking.filter.surely_at_rest and not by_point and math.isfinite(visual.error_rad[1]):
+            probability = self._error_probability(estimate, joints, judged)
+        objection = self.tracking.ambiguity
+        self.judge.update_pair(stamp_s, now_s, error, steady, verging, probability, direction_error, objection)
+
+    def _is_steady(self, estimate: TargetEstimate, stamp_s: float, now_s: float) -> bool:
+        """Return whether the estimate of a pair is certain, and the eyes rest on it, or turn along with it."""
         # Eyes that sweep across the target are not verged on it; eyes that turn along with it are.
         along = float(np.abs(estimate.rates_rad_s).max()) if estimate.moving else 0.0
         sweeping = (
             self.history.speed_within(stamp_s - self._p.exposure.settle_s, stamp_s) > along + self._p.verged.sweep_rad_s
         )
         certain = float(estimate.sigmas_rad[1]) < self._p.verged.steady_rad
-        self.judge.update_target(stamp_s, error, direction_error)
+        if sweeping or not certain:
+            return False
         # Eyes that passed over the target at the exposure are elsewhere by now; eyes that were on it for long stay.
-        on_target = self._on_target(now_s) or self.judge.long_on_target(now_s)
+        if not (self.judge.long_on_target(now_s) or self._on_target(now_s)):
+            return False
         # Since the exposure a correction may have been sent: until it has ended, one eye is ahead of the other. A small
         # one has mostly ended by the time this is known.
         turned_rad = float(np.abs(self.history.reported_rad - self.history.reported_at(stamp_s)).max())
         correcting = not along and max(turned_rad, 0.5 * self.history.sent_since(stamp_s)) > self.judge.enter_rad
-        steady = certain and on_target and not sweeping and not correcting
-        probability = 1.0
-        # A target that moves, or may move, can be elsewhere by now: there one pair is never enough.
-        if self.tracking.filter.surely_at_rest and not by_point and math.isfinite(visual.error_rad[1]):
-            p, off, sigmas = self._p.verged, estimate.joints_rad - joints, estimate.joint_sigmas_rad
-            measured_error = Gaussian(vergence_error, float(estimate.sigmas_rad[1]))
-            probability = probability_beyond_limit(
-                self._predicted_error, measured_error, p.leave_rad, p.wrong_share, p.wrong_range_rad
-            )
-            probability += sum(
-                Gaussian(float(off[i]), float(sigmas[i])).probability_beyond(p.leave_rad) for i in judged
-            )
-        objection = self.tracking.ambiguity
-        self.judge.update_pair(stamp_s, now_s, error, steady, verging, probability, direction_error, objection)
+        return not correcting
+
+    def _error_probability(self, estimate: TargetEstimate, joints_rad: Array, judged: Sequence[int]) -> float:
+        """Return how probable an error beyond the limit is, by the prediction before the pair and by the pair."""
+        p, off, sigmas = self._p.verged, estimate.joints_rad - joints_rad, estimate.joint_sigmas_rad
+        vergence_error = estimate.vergence_rad - float(joints_rad[1] - joints_rad[0])
+        measured = Gaussian(vergence_error, float(estimate.sigmas_rad[1]))
+        probability = probability_beyond_limit(
+            self._predicted_error, measured, p.leave_rad, p.wrong_share, p.wrong_range_rad
+        )
+        return probability + sum(
+            Gaussian(float(off[i]), float(sigmas[i])).probability_beyond(p.leave_rad) for i in judged
+        )
 
     def _on_target(self, now_s: float) -> bool:
         """Return whether the eyes by now are on the predicted target, with enough certainty."""

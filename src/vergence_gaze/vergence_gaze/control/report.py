@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from vergence_gaze.control.perception import Perception
 from vergence_gaze.estimation.distance import TargetPosition
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.goals.goal import ObjectRequest, Outcome, TrackRequest
 from vergence_gaze.phases import Phase, PhaseMachine
 from vergence_rig.geometry import EyeAngles, GeometryError

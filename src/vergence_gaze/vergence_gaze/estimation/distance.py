@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.estimation.vergence_offset import VergenceOffset
 from vergence_rig.geometry import GeometryError, from_version_vergence
 from vergence_rig.kinematics import Kinematics

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.joints.shaft_history import ShaftHistory
 from vergence_gaze.parameters import GazeParameters
 

@@ -28,7 +28,7 @@ import numpy.typing as npt
 from vergence_gaze.estimation.exposures import Exposures
 from vergence_gaze.estimation.kalman import Measurement
 from vergence_gaze.estimation.observations import SAME_PAIR_S, BoxSighting, PointSighting, TrackSighting
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.goals.requested_point import RequestedPoint
 from vergence_gaze.target_parameters import TargetParameters
 

@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_gaze.estimation.kalman import Measurement
-from vergence_gaze.estimation.target_filter import TargetEstimate, TargetFilter
+from vergence_gaze.estimation.target_estimate import TargetEstimate
+from vergence_gaze.estimation.target_filter import TargetFilter
 from vergence_gaze.estimation.visual_error import VisualError
 from vergence_gaze.joints.joint_moves import JointMoves
 from vergence_gaze.joints.shaft_history import ShaftHistory

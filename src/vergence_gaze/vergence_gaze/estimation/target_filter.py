@@ -5,8 +5,6 @@ jump looks like an outlier until a second measurement is consistent with it.
 """
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +13,10 @@ from vergence_gaze.estimation import jump_detector as jumps
 from vergence_gaze.estimation.imm_filter import ImmFilter
 from vergence_gaze.estimation.jump_detector import RATE_SIGMA_RAD_S
 from vergence_gaze.estimation.kalman import TILT, VERGENCE, VERSION, Innovation, KalmanFilter, Measurement
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 
 Array = npt.NDArray[np.float64]
 
-_TO_JOINTS = np.array([[1.0, -0.5, 0.0], [1.0, 0.5, 0.0], [0.0, 0.0, 1.0]])
 _EVIDENCE_FADE = 0.8
 _EVIDENCE_TO_MOVE = 7.0
 _EVIDENCE_TO_REST = -2.0
@@ -36,56 +34,6 @@ _COMPARABLE_S = 0.5
 _MINIMUM_WEIGHT = 0.3
 _FOLLOWING_VARIANCE = 1e-5
 _KEPT_ESTIMATES = 8
-
-
-def joints_of(angles_rad: Array) -> Array:
-    """Return pan_left, pan_right, tilt (3,) for version, vergence, tilt (3,)."""
-    return np.asarray(_TO_JOINTS @ angles_rad, np.float64)
-
-
-@dataclass(frozen=True)
-class TargetEstimate:
-    """The target at one time: angles that fixate it (3,) [rad], rates (3,) [rad/s], covariance of the angles (3, 3)."""
-
-    angles_rad: Array
-    rates_rad_s: Array
-    covariance: Array
-    moving: bool
-
-    @property
-    def version_rad(self) -> float:
-        """Version that fixates the target."""
-        return float(self.angles_rad[0])
-
-    @property
-    def vergence_rad(self) -> float:
-        """Vergence that fixates the target."""
-        return float(self.angles_rad[1])
-
-    @property
-    def tilt_rad(self) -> float:
-        """Tilt that fixates the target."""
-        return float(self.angles_rad[2])
-
-    @cached_property
-    def joints_rad(self) -> Array:
-        """Joint angles (3,), pan_left, pan_right, tilt, that fixate the target."""
-        return joints_of(self.angles_rad)
-
-    @property
-    def joint_rates_rad_s(self) -> Array:
-        """How fast each joint (3,) turns while it follows the target."""
-        return _TO_JOINTS @ self.rates_rad_s
-
-    @cached_property
-    def joint_sigmas_rad(self) -> Array:
-        """Standard deviations (3,) of the joint angles that fixate the target."""
-        return np.sqrt(np.diag(_TO_JOINTS @ self.covariance @ _TO_JOINTS.T))
-
-    @property
-    def sigmas_rad(self) -> Array:
-        """Standard deviations of the angles (3,)."""
-        return np.sqrt(np.diag(self.covariance))
 
 
 class TargetFilter:
@@ -185,8 +133,11 @@ class TargetFilter:
         # A depth within the gate does not contradict a direction outside it.
         self._outliers = [before for before in self._outliers if not before.same_kind(measurement)]
         advantage = rest.negative_log_likelihood - self._motion.negative_log_likelihood(motion)
+        moved = self._moving
         self._update_evidence(advantage, len(measurement.values))
-        self._update_models(measurement, motion)
+        if moved and not self._moving:
+            rest = self._rest.innovation(measurement, self._time_s)  # from its new place
+        self._update_models(measurement, rest, motion)
         return True
 
     def accept_jump(self, measurement: Measurement) -> bool:
@@ -200,7 +151,8 @@ class TargetFilter:
         self._reopen(consistent[0], measurement)
         if jumps.continues_moving(consistent[0], measurement, self._bound(measurement)):
             self._moving, self._evidence = True, _EVIDENCE_TO_MOVE
-        self._update_models(measurement, self._motion.innovations(measurement, self._time_s))
+        motion = self._motion.innovations(measurement, self._time_s)
+        self._update_models(measurement, self._rest.innovation(measurement, self._time_s), motion)
         return True
 
     def at(self, time_s: float) -> TargetEstimate:
@@ -252,10 +204,12 @@ class TargetFilter:
                 self._moving = False
                 self._copy_place_to_rest()
             return
+        self._moving = self._evidence > _EVIDENCE_SURE or (self._evidence > _EVIDENCE_TO_MOVE and self._rate_is_sure())
+
+    def _rate_is_sure(self) -> bool:
         state, covariance = self._motion.combined()
         rates, spread = state[1::2], covariance[1::2, 1::2]
-        significant = float(rates @ np.linalg.solve(spread, rates)) > _SIGNIFICANT_RATE
-        self._moving = self._evidence > (_EVIDENCE_TO_MOVE if significant else _EVIDENCE_SURE)
+        return float(rates @ np.linalg.solve(spread, rates)) > _SIGNIFICANT_RATE
 
     def _copy_place_to_rest(self) -> None:
         state, covariance = self._motion.combined()
@@ -264,9 +218,8 @@ class TargetFilter:
         self._rest.state[0::2] = state[0::2]
         self._rest.covariance[0::2, 0::2] = covariance[0::2, 0::2] + np.eye(3) * _FOLLOWING_VARIANCE
 
-    def _update_models(self, measurement: Measurement, motion: tuple[Innovation, Innovation]) -> None:
+    def _update_models(self, measurement: Measurement, rest: Innovation, motion: tuple[Innovation, Innovation]) -> None:
         self._motion.update(motion)
-        rest = self._rest.innovation(measurement, self._time_s)
         off = rest.distance / self._bound(measurement)
         if off > 1.0 and self._moving:
             # A model at rest outside its gate follows, so that it can take over when the target stops.

@@ -26,8 +26,8 @@ from vergence_gaze.estimation.gates import (
 )
 from vergence_gaze.estimation.kalman import Measurement
 from vergence_gaze.estimation.observations import BoxSighting, PointSighting, TrackSighting
+from vergence_gaze.estimation.target_estimate import joints_of
 from vergence_gaze.estimation.target_estimator import TargetEstimator
-from vergence_gaze.estimation.target_filter import joints_of
 from vergence_gaze.goals.goal import TrackRequest
 from vergence_gaze.goals.requested_class import RequestedClass
 from vergence_gaze.goals.requested_point import RequestedPoint

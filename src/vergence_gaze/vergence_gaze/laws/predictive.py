@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vergence_gaze.estimation.target_filter import TargetEstimate
+from vergence_gaze.estimation.target_estimate import TargetEstimate
 from vergence_gaze.joints.servo_inverse import ServoInverse
 from vergence_gaze.laws.protocol import ControlInput, target_residual
 from vergence_gaze.parameters import GazeParameters

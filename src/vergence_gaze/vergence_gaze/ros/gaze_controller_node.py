@@ -20,6 +20,7 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_seconds
+from vergence_common.two_rates import TwoRates
 from vergence_gaze.attention_parameters import POLICIES
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.control.report import Command, GazeReport
@@ -94,8 +95,9 @@ class GazeControllerNode(Node):
         subscribe_camera_info(watch, "right/camera_info", lambda m: self._on_camera(m, left=False))
         self.create_service(SetBool, "~/enable", self._on_enable)
         self.create_service(Trigger, "~/stop", self._on_stop)
-        self._period_s, self._resting = 1.0 / values.control_rate_hz, False
-        self._timer = self.create_timer(self._period_s, self._cycle)
+        period_s = 1.0 / values.control_rate_hz
+        self._cycle_timer = TwoRates(self, self._cycle, period_s, max(period_s, _RESTING_PERIOD_S))
+        self._cycled_s = math.nan
 
     @property
     def resolution_rad(self) -> list[float]:
@@ -152,23 +154,23 @@ class GazeControllerNode(Node):
 
     def _end_rest(self) -> None:
         """Go on at the full rate, with what has arrived: something is requested or read."""
-        if not self._resting:
-            return
-        self._resting = False
-        self._timer.timer_period_ns = round(1e9 * self._period_s)
-        self._timer.reset()
-        arrived, self._arrived = self._arrived, []
-        self._controller.observe(arrived, self._now_s())
+        if self._cycle_timer.set_fast(True):
+            arrived, self._arrived = self._arrived, []
+            self._controller.observe(arrived, self._now_s())
 
     def _cycle(self) -> None:
         now_s = self._now_s()
+        if now_s == self._cycled_s:
+            # rclpy's events executor may call a due timer twice, which then leaves out its next period.
+            self._cycle_timer.timer.reset()
+            return
+        self._cycled_s = now_s
         arrived, self._arrived = self._arrived, []
         self._cycles += 1
         if not self._controller.rests(now_s) or any(self._read):
             self._end_rest()
-        elif not self._resting:
-            self._resting = True
-            self._timer.timer_period_ns = round(1e9 * max(self._period_s, _RESTING_PERIOD_S))
+        else:
+            self._cycle_timer.set_fast(False)
         for server in self._servers:
             server.forward_cancels(now_s)
         self._vision.update(self._controller.uses_images, monotonic())

@@ -22,8 +22,7 @@ from vergence_gaze.estimation.observations import (
     JointResolution,
     TrackSighting,
 )
-from vergence_gaze.goals.goal import Goal, GoalKind, ObjectRequest, Outcome, TrackRequest
-from vergence_msgs.action import LookAt
+from vergence_gaze.goals.goal import ObjectRequest, TrackRequest
 from vergence_msgs.msg import BoxVergence, EdgeVergence, EyeRotation, GazeState, TargetTrack
 from vergence_msgs.msg import ObjectRequest as ObjectRequestMessage
 from vergence_msgs.msg import TrackRequest as TrackRequestMessage
@@ -159,60 +158,6 @@ def camera_model(message: CameraInfo) -> CameraModel:
     """Return the camera of a CameraInfo; raises CameraModelError if it is not calibrated."""
     return CameraModel.from_camera_info_values(
         message.width, message.height, message.k, message.d, message.distortion_model
-    )
-
-
-def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: EyeImage, right: EyeImage) -> Goal:
-    """Return a LookAt goal; `point_m` is its point, already in rig_base. Raises ValueError for another kind or size."""
-    stamp_s = to_seconds(request.header.stamp)
-    left_xy = left.undistort([[request.left_x_px, request.left_y_px]])[0]
-    right_xy = right.undistort([[request.right_x_px, request.right_y_px]])[0]
-    return Goal(
-        kind=GoalKind(request.kind),
-        point_m=point_m,
-        left_eye=request.eye == LookAt.Goal.EYE_LEFT,
-        left_xy=(float(left_xy[0]), float(left_xy[1])),
-        right_xy=(float(right_xy[0]), float(right_xy[1])),
-        depth_m=request.depth_m if request.depth_m > 0 else math.nan,
-        extent_rad=_extent_rad(request, left if request.eye == LookAt.Goal.EYE_LEFT else right),
-        version_rad=request.version_rad,
-        vergence_rad=request.vergence_rad,
-        tilt_rad=request.tilt_rad,
-        class_name=request.class_name,
-        stamp_s=stamp_s if stamp_s > 0 else math.nan,
-        time_limit_s=request.time_limit_s,
-    )
-
-
-def _extent_rad(request: LookAt.Goal, image: EyeImage) -> tuple[float, float]:
-    """Return the angular size of a goal's object, NaN if unknown. Raises ValueError for one that no object has."""
-    size_px = request.width_px, request.height_px
-    if any(side < 0.0 or math.isinf(side) for side in size_px):
-        raise ValueError(f"width_px and height_px must be at least 0 and finite: got {size_px[0]:g} and {size_px[1]:g}")
-    if not all(side > 0.0 for side in size_px):
-        return math.nan, math.nan
-    return size_px[0] / image.fx_px, size_px[1] / image.fx_px
-
-
-def look_at_result(outcome: Outcome, report: GazeReport | None, stamp_s: float) -> LookAt.Result:
-    """Return the action's result."""
-    result = LookAt.Result(result=int(outcome.result), reason=outcome.reason, time_s=outcome.time_s)
-    if report is not None:
-        result.fixation_point = point_stamped(report.fixation_m, stamp_s)
-        result.vergence_rad = report.vergence_rad
-    return result
-
-
-def look_at_feedback(report: GazeReport) -> LookAt.Feedback:
-    """Return the action's feedback."""
-    version, vergence, tilt = (math.degrees(residual) for residual in report.residual_rad)
-    return LookAt.Feedback(
-        phase_name=report.phase.name.lower(),
-        version_residual_deg=version,
-        vergence_residual_deg=vergence,
-        tilt_residual_deg=tilt,
-        residual_px=report.residual_px,
-        contrast=report.contrast,
     )
 
 

@@ -13,7 +13,7 @@ from vergence_gaze.control.controller import GazeController
 from vergence_gaze.control.report import GazeReport
 from vergence_gaze.goals.goal import Goal, Outcome, Result
 from vergence_gaze.goals.requested_class import check_class, with_detector
-from vergence_gaze.ros import gaze_messages as convert
+from vergence_gaze.ros import look_at_messages as convert
 from vergence_gaze.ros.goal_reports import gaze_goal
 from vergence_gaze.ros.goal_server import GoalServer
 from vergence_gaze.ros.point_frames import PointFrames

@@ -35,8 +35,9 @@ from vergence_metric.ros.box_messages import (
     vision_message,
     vision_type,
 )
+from vergence_metric.ros.image_pair import IdealPair, ImagePair
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
-from vergence_metric.ros.stereo_input import IdealPair, ImagePair, StereoInput
+from vergence_metric.ros.stereo_input import StereoInput
 from vergence_msgs.msg import BoxVergence, DetectorClasses, ObjectRequest, StereoDetections
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.parameters import ParameterError
@@ -73,9 +74,9 @@ class BoxMetricNode(MetricNode):
         self._vision_publishers = [
             self._output(qos, vision, f"vergence/{eye}_detections") for eye in EYES if vision is not None
         ]
-        self._worker: LatestWorker[ImagePair] = LatestWorker(
-            self._measure, self._on_failure, "measure", settings.niceness
-        )
+        # Simulated time stands until this is done: everything waits for it then.
+        niceness = 0 if self.get_parameter("use_sim_time").value else settings.niceness
+        self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure", niceness)
         pairing = self._settings.get(PairingParameters)
         self._stereo = StereoInput(
             self, settings, pairing, diagnostics, qos, self._on_pair, self._rig, images=self._images
@@ -131,7 +132,7 @@ class BoxMetricNode(MetricNode):
         self._measurement.set_parameters(self._metric_parameters)
         eyes = self._joints.at(pair.left_stamp_ns, pair.right_stamp_ns)
         with self._times.measure("ideal_images"):
-            ideal = self._stereo.ideal(pair)
+            ideal = self._stereo.cameras.ideal(pair)
         with self._times.measure("metric"):
             result = self._measurement.measure(ideal.left, ideal.right, pair.left_stamp_ns * 1e-9, eyes, ideal.cameras)
         self._publish(pair, ideal, result)

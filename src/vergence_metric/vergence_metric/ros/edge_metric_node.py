@@ -30,8 +30,9 @@ from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.pairs.picture_faults import PictureMonitor
 from vergence_metric.ros.edge_messages import edge_message, error_message, unusable_edge_message, unusable_error_message
+from vergence_metric.ros.image_pair import IdealPair, ImagePair
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
-from vergence_metric.ros.stereo_input import IdealPair, ImagePair, StereoInput
+from vergence_metric.ros.stereo_input import StereoInput
 from vergence_metric.ros.stored_images import StoredImages
 from vergence_metric.ros.track_messages import track_message, track_request, unusable_track_message
 from vergence_metric.tracking.parameters import TrackerParameters
@@ -99,11 +100,11 @@ class EdgeMetricNode(MetricNode):
             message, stored = self._requests.popleft()
             seen = None
             if stored is not None:
-                ideal = self._stereo.ideal(stored, grey=True)
+                ideal = self._stereo.cameras.ideal(stored, grey=True)
                 eyes = self._joints.at(stored.left_stamp_ns, stored.right_stamp_ns)
                 if eyes is not None:
                     seen = SeenPair(stored.left_stamp_ns * 1e-9, ideal.left, ideal.right, eyes)
-            self._measurement.request_track(track_request(message, self._stereo.eye_images), seen)
+            self._measurement.request_track(track_request(message, self._stereo.cameras.eye_images), seen)
 
     def _measure(self, pair: ImagePair) -> None:
         self._measurement.set_parameters(_measurement_parameters(self._settings))
@@ -114,7 +115,7 @@ class EdgeMetricNode(MetricNode):
             self._publish_unusable(fault.reason, header, skew_s)
             return
         with self._times.measure("ideal_images"):
-            ideal = self._stereo.ideal(pair, grey=True)
+            ideal = self._stereo.cameras.ideal(pair, grey=True)
         models = ideal.cameras
         with self._times.measure("pictures"):
             self._update_order(pair, ideal)
@@ -135,7 +136,7 @@ class EdgeMetricNode(MetricNode):
         if self._overlay_publisher.get_subscription_count():
             with self._times.measure("overlay"):
                 disparity = self._measurement.disparity(edge)
-                picture = draw_overlay(self._stereo.ideal(pair).left, edge, disparity)
+                picture = draw_overlay(self._stereo.cameras.ideal(pair).left, edge, disparity)
                 self._overlay_publisher.publish(array_to_image(picture, header))
         self._measurement.update_alignment()
         self._failure = None

@@ -22,8 +22,9 @@ from vergence_metric.eye_rotation.resting_pairs import measure_pair
 from vergence_metric.pairs.latest_worker import LatestWorker
 from vergence_metric.pairs.parameters import PairingParameters
 from vergence_metric.ros.eye_rotation_messages import eye_rotation_message
+from vergence_metric.ros.image_pair import ImagePair
 from vergence_metric.ros.metric_node import MetricNode, limit_threads
-from vergence_metric.ros.stereo_input import ImagePair, StereoInput
+from vergence_metric.ros.stereo_input import StereoInput
 from vergence_msgs.msg import EyeRotation
 from vergence_rig.rig_file import load_rig
 
@@ -70,7 +71,7 @@ class EyeRotationNode(MetricNode):
 
     def _measure(self, two: tuple[ImagePair, ImagePair]) -> None:
         before, pair = two
-        models = self._stereo.calibrated(pair)
+        models = self._stereo.cameras.calibrated(pair)
         rest = self._settings.get(RestParameters)
         with self._times.measure("pair"):
             reading = measure_pair(self._encoder, rest, before, pair, self._joints, models)

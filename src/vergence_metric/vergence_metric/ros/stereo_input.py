@@ -13,7 +13,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from vergence_common.awaited import report_awaited
@@ -23,51 +23,20 @@ from vergence_common.images import ImageError, compressed_to_array, image_to_arr
 from vergence_common.local_images import LocalImages
 from vergence_common.qos import IMAGE_QOS, QosWatch
 from vergence_common.stamps import to_nanoseconds
-from vergence_metric.edges.edges import to_grey
-from vergence_metric.pairs.ideal_images import IdealImages, Models
 from vergence_metric.pairs.pairing import LEFT, RIGHT, Pair, StereoPairer
 from vergence_metric.pairs.parameters import PairingParameters, StereoParameters
 from vergence_metric.pairs.stage_times import StageTimes
 from vergence_metric.pairs.stream_health import StreamHealth
-from vergence_rig.camera import CameraModel, CameraModelError
-from vergence_rig.eye_image import EyeImage
+from vergence_metric.ros.image_pair import SIDES, ImageFrame, ImagePair
+from vergence_metric.ros.stereo_cameras import StereoCameras
 from vergence_rig.rig import Rig
 
-SIDES = ("left", "right")
 _SOURCES = (
     "Images come from camera_node (rig.launch.py), sim_node (sim.launch.py), photo_node or another camera's driver"
 )
 
 # camera_info is small and repeated with every image; best effort is compatible with every publisher.
 _INFO_QOS = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
-
-
-@dataclass(frozen=True, slots=True)
-class ImageFrame:
-    """One eye's image: header, pixels (h, w, 3) BGR or (h, w) grey uint8, and time of arrival [ns, monotonic]."""
-
-    header: Header
-    pixels: npt.NDArray[np.uint8]
-    arrived_ns: int
-
-
-ImagePair = Pair[ImageFrame]
-
-
-@dataclass(frozen=True, slots=True)
-class IdealPair:
-    """Both eyes' ideal images, and how they map to the images as they were taken; None without known cameras."""
-
-    left: npt.NDArray[np.uint8]
-    right: npt.NDArray[np.uint8]
-    eye_images: tuple[EyeImage, EyeImage] | None
-    seen_px: int | None = None
-    """Side of the largest square about the middle that both cameras saw; None where they saw all."""
-
-    @property
-    def cameras(self) -> Models | None:
-        """The ideal cameras."""
-        return self.eye_images and (self.eye_images[0].ideal, self.eye_images[1].ideal)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +50,9 @@ class _Undecoded:
 class StereoInput:
     """Subscribes both eyes, passes each pair of images to `on_pair`, and adds diagnostics of the input.
 
-    `on_pair` runs in the executor's thread and should only hand the pair on. `models` holds the left and the right
-    camera model by camera_info, None before the first. With `is_due`, only pairs for whose left stamp [ns] it is true
-    are decoded; the others only count as received. With `images`, those that a node of this process has are taken from
-    there; others are subscribed, decoded at once and handed on.
+    `on_pair` runs in the executor's thread and should only hand the pair on. With `is_due`, only pairs for whose left
+    stamp [ns] it is true are decoded; the others only count as received. With `images`, those that a node of this
+    process has are taken from there; others are subscribed, decoded at once and handed on.
     """
 
     def __init__(
@@ -99,10 +67,7 @@ class StereoInput:
         is_due: Callable[[int], bool] | None = None,
         images: LocalImages | None = None,
     ) -> None:
-        self.models: list[CameraModel | None] = [None, None]
-        self.eye_images: tuple[EyeImage, EyeImage] | None = None
-        """How the images of the newest pair map to ideal ones; None before the first, or without known cameras."""
-        self._ideal = IdealImages(rig)
+        self.cameras = StereoCameras(rig, node.get_logger(), lambda side: self._health[side].size_px)
         self.decode_times = StageTimes()
         self._node = node
         self._stereo, self._pairing = stereo, pairing
@@ -111,7 +76,6 @@ class StereoInput:
         self._pairer: StereoPairer[Any] = StereoPairer(pairing)
         self._size_mismatch: str | None = None
         self._size_mismatches = 0
-        self._info_errors: list[str | None] = [None, None]
         self._deadline = node.create_timer(
             1.0, self._on_deadline, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False
         )
@@ -130,7 +94,7 @@ class StereoInput:
         for side, name in enumerate(SIDES):
             diagnostics.add(f"{name} images", lambda side=side: self._stream_report(side))  # type: ignore[misc]
         diagnostics.add("pairs", self._pairs_report)
-        diagnostics.add("cameras", self._cameras_report)
+        diagnostics.add("cameras", self.cameras.report)
         report_awaited(node, lambda: [health.topic for health in self._health if not health.received], _SOURCES)
 
     @property
@@ -165,7 +129,7 @@ class StereoInput:
                 self._subscribe(qos, message_type, f"{name}/{suffix}", self._on_image, side, IMAGE_QOS)
                 if images is not None:
                     images.offer(self._topics[side])
-            on_info = partial(self._on_info, side)
+            on_info = partial(self.cameras.on_info, side)
             self._subscriptions.append(subscribe_camera_info(qos, f"{name}/camera_info", on_info, _INFO_QOS))
 
     def set_parameters(self, stereo: StereoParameters, pairing: PairingParameters) -> None:
@@ -245,7 +209,7 @@ class StereoInput:
             self._deadline.reset()
         for pair in filter(None, map(self._decoded_pair, pairs)):
             left, right = pair.left.pixels.shape, pair.right.pixels.shape
-            if left[:2] != right[:2] and self.cameras_of(pair) is None:
+            if left[:2] != right[:2] and self.cameras.cameras_of(pair) is None:
                 self._size_mismatch = (
                     "images of two cameras without calibration must have one size: "
                     f"got {left[1]}x{left[0]} and {right[1]}x{right[0]}"
@@ -254,38 +218,6 @@ class StereoInput:
                 continue
             self._size_mismatch = None
             self._on_pair(pair)
-
-    def _on_info(self, side: int, message: CameraInfo) -> None:
-        seen = (message.width, message.height, tuple(message.k), tuple(message.d), message.distortion_model)
-        try:
-            self.models[side] = CameraModel.from_camera_info_values(*seen)
-            self._info_errors[side] = None
-        except CameraModelError as error:
-            self.models[side] = None
-            self._info_errors[side] = str(error)
-            self._node.get_logger().warning(f"{self._camera_fault(side)[1]}")
-
-    def cameras_of(self, pair: ImagePair) -> Models | None:
-        """Return both cameras of a pair, by camera_info or else by rig.yaml; None where neither has that image size."""
-        try:
-            return self._ideal.cameras((self.models[LEFT], self.models[RIGHT]), (pair.left.pixels, pair.right.pixels))
-        except ValueError:
-            return None
-
-    def calibrated(self, pair: ImagePair) -> Models | None:
-        """Return both cameras of a pair if camera_info describes them for images of this size, else None."""
-        cameras, (left, right) = self.cameras_of(pair), self.models
-        return cameras if cameras is not None and cameras[0] is left and cameras[1] is right else None
-
-    def ideal(self, pair: ImagePair, grey: bool = False) -> IdealPair:
-        """Return a pair as ideal cameras would take it, or as it is where the cameras are not known."""
-        pictures = (pair.left.pixels, pair.right.pixels)
-        left, right = (to_grey(pixels) for pixels in pictures) if grey else pictures
-        cameras = self.cameras_of(pair)
-        if cameras is None:
-            return IdealPair(left, right, None)
-        self.eye_images = self._ideal.set_cameras(cameras)
-        return IdealPair(*self._ideal.draw(left, right), self.eye_images, self._ideal.seen_px)
 
     def _stream_report(self, side: int) -> Report:
         health = self._health[side]
@@ -317,22 +249,3 @@ class StereoInput:
         if counts.pairs == 0:
             return Report(WARN, "no pair of images yet", values)
         return Report(OK, f"{counts.pairs} pairs", values)
-
-    def _cameras_report(self) -> Report:
-        faults = [(self._info_errors[side] is not None, *self._camera_fault(side)) for side in (LEFT, RIGHT)]
-        # Of two as bad, what was refused tells more than what has not come.
-        _, level, text = max(faults, key=lambda one: (one[1], one[0]))
-        return Report(level, text) if text else Report(OK, "camera_info received from both cameras")
-
-    def _camera_fault(self, side: int) -> tuple[int, str]:
-        """Return level and text of what is wrong with a camera's description; OK and "" if nothing is."""
-        topic, model, size = f"{SIDES[side]}/camera_info", self.models[side], self._health[side].size_px
-        if model is not None and size in (None, (model.width_px, model.height_px)):
-            return OK, ""
-        if model is not None and size is not None:
-            level, fault = ERROR, f"must be for {size[0]}x{size[1]} images: got {model.width_px}x{model.height_px}"
-        else:
-            level, fault = WARN, self._info_errors[side] or "no message yet"
-        if size is not None and not self._ideal.describes(side == LEFT, *size):
-            return ERROR, f"{topic}: {fault}; rig.yaml describes another image shape too: angles are NaN"
-        return level, f"{topic}: {fault}; rig.yaml's description of the camera is used"

@@ -11,7 +11,7 @@ from sensor_msgs.msg import CompressedImage
 from vergence_common.images import ImageError, compressed_to_array
 from vergence_common.stamps import to_nanoseconds
 from vergence_metric.pairs.pairing import LEFT, RIGHT, Pair
-from vergence_metric.ros.stereo_input import SIDES, ImageFrame, ImagePair
+from vergence_metric.ros.image_pair import SIDES, ImageFrame, ImagePair
 from vergence_msgs.srv import GetStoredImage
 
 

@@ -15,9 +15,10 @@ from vergence_metric.tracking.registry import make_tracker
 from vergence_metric.tracking.request import StoredPair
 from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import EyeAngles, eye_position, gaze_for_point, rotation_rig_from_optical
+from vergence_rig.geometry import EyeAngles, rotation_rig_from_optical
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import default_rig
+from vergence_rig.testing.ideal_eyes import eye_position, gaze_for_point
 
 Grey = NDArray[np.float32]
 Image = NDArray[np.uint8]

@@ -19,6 +19,7 @@ from vergence_common.node_main import run_node
 from vergence_common.parameters import ParameterSet, declare
 from vergence_common.qos import watch_qos
 from vergence_common.stamps import to_nanoseconds
+from vergence_common.two_rates import TwoRates
 from vergence_servo.command_guard import (
     CommandRefusedError,
     StampGuard,
@@ -38,8 +39,8 @@ from vergence_servo.servo_head import Mode
 from vergence_servo.servo_reports import CommandCounts, channel_report, commands_report, head_report
 from vergence_servo.trajectory import Trajectory, check_end, start_delay_s
 
-_RESTING_AFTER_S = 1.0  # without motion, from when joint_states come at a lower rate
-_RESTING_PERIOD_S = 0.1
+_RESTING_AFTER_S = 1.0  # without commands and motion, from when joint_states come at a lower rate
+_RESTING_PERIOD_S = 0.1  # of joint_states then, and of time-outs while no servo is under way
 
 COMMAND_TOPICS = ("joint_command", "~/commands", "joint_trajectory")
 
@@ -98,12 +99,11 @@ class ServoNode(Node):
         )
         # Servos are real also beside simulated time: their time-outs must not stand with /clock.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._updates = self.create_timer(1.0 / values.update_rate_hz, self._step, clock=steady)
-        self._period_s = 1.0 / values.state_rate_hz
-        # Time-outs and the guardian's heartbeat go on with every report.
-        self._resting_period_s = max(self._period_s, min(_RESTING_PERIOD_S, 0.1 * values.guardian_timeout_s))
-        self._moved_s = time.monotonic()
-        self._reports = self.create_timer(self._period_s, self._on_report, clock=steady)
+        # Between motions an update is for time-outs and the guardian's heartbeat alone.
+        moving_s, standing_s = 1.0 / values.update_rate_hz, min(_RESTING_PERIOD_S, 0.1 * values.guardian_timeout_s)
+        self._updates = TwoRates(self, self._step, moving_s, max(moving_s, standing_s), steady)
+        self._moved_s, period_s = time.monotonic(), 1.0 / values.state_rate_hz
+        self._reports = TwoRates(self, self._on_report, period_s, max(period_s, _RESTING_PERIOD_S), steady)
         self.create_timer(1.0, self._check_commanders, clock=steady)
 
     def _step(self) -> None:
@@ -112,6 +112,7 @@ class ServoNode(Node):
             self._trajectories.update(time.monotonic())
         if pause_s:
             self.get_logger().error(f"this node hung for {pause_s:.1f} s: its guardian has released the servos")
+        self._updates.set_fast(self._head.under_way)
 
     @staticmethod
     def _report_channel(channel: ServoChannel) -> Report:
@@ -167,10 +168,8 @@ class ServoNode(Node):
 
     def _end_rest(self) -> None:
         """Step and report at the full rate again, the pose before any motion first."""
-        if self._updates.is_canceled():
-            self._updates.reset()
-            self._reports.timer_period_ns = round(1e9 * self._period_s)
-            self._reports.reset()
+        self._updates.set_fast(self._head.under_way)
+        if self._reports.set_fast(True):
             self._publish_state()
 
     def _check_stamp(self, message: JointState) -> None:
@@ -191,11 +190,8 @@ class ServoNode(Node):
         return response
 
     def _on_report(self) -> None:
-        if self._updates.is_canceled():
-            self._step()
-        elif time.monotonic() - self._moved_s > _RESTING_AFTER_S:
-            self._updates.cancel()
-            self._reports.timer_period_ns = round(1e9 * self._resting_period_s)
+        if time.monotonic() - self._moved_s > _RESTING_AFTER_S:
+            self._reports.set_fast(False)
         self._publish_state()
 
     def _publish_state(self) -> None:
@@ -205,7 +201,7 @@ class ServoNode(Node):
         elapsed_s = max(now_s - before_s, 1e-3)
         velocities = {name: (position - before.get(name, position)) / elapsed_s for name, position in positions.items()}
         self._reported_rad = (now_s, positions)
-        if self._head.moving or positions != before:
+        if self._head.commanded or positions != before:
             self._moved_s = now_s
         self._states.publish(convert.joint_state(self.get_clock().now().to_msg(), positions, velocities))
 

@@ -5,7 +5,6 @@ Messages stay serialised until they are shown: most are never looked at, and JPE
 
 import json
 import math
-import struct
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -21,6 +20,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 
 from vergence_common.images import image_to_array
 from vergence_common.qos import IMAGE_QOS, STATE_QOS, QosWatch
+from vergence_common.stamps import STAMP_END, stamp_of_serialised
 from vergence_msgs.msg import (
     BoxVergence,
     DetectorClasses,
@@ -171,7 +171,7 @@ class GraphInput:
 
     def _note(self, topic: str, message: bytes) -> int:
         """Count a message; return its stamp [ns]."""
-        now_s, stamp_ns, stream = time.monotonic(), stamp_of(message), self._streams[topic]
+        now_s, stamp_ns, stream = time.monotonic(), stamp_of_serialised(message), self._streams[topic]
         stream.add(message, now_s)
         if now_s - self._aged_s.get(topic, -math.inf) > _AGE_EVERY_S:
             self._aged_s[topic] = now_s
@@ -210,7 +210,7 @@ class GraphInput:
         except ValueError as error:
             self._refused = f"edges: {error}"
             return
-        self._post({"edges": Part(data=data, about={"stamp": str(stamp_of(message))})})
+        self._post({"edges": Part(data=data, about={"stamp": str(stamp_of_serialised(message))})})
 
     def _on_diagnostics(self, message: bytes) -> None:
         now_s = time.monotonic()
@@ -255,9 +255,9 @@ class GraphInput:
         for eye in EYES:
             raw = self._streams[f"{eye}/camera_info"].message
             # All but the stamp: it comes with every image and seldom changes.
-            if raw is None or self._infos.get(eye) == raw[_AFTER_STAMP:]:
+            if raw is None or self._infos.get(eye) == raw[STAMP_END:]:
                 continue
-            self._infos[eye] = raw[_AFTER_STAMP:]
+            self._infos[eye] = raw[STAMP_END:]
             info = deserialize_message(raw, CameraInfo)
             try:
                 model: CameraModel | None = CameraModel.from_camera_info_values(
@@ -288,16 +288,3 @@ class GraphInput:
             "diagnostics": self._health.as_values(now_s),
             "classes": [str(name)[:100] for name in classes.message.names[:100]] if classes else None,
         }
-
-
-_STAMP = struct.Struct("<iI"), struct.Struct(">iI")
-_AFTER_STAMP = 4 + 8
-
-
-def stamp_of(message: bytes) -> int:
-    """Return the stamp [ns] of a serialised message that begins with a std_msgs/Header.
-
-    CDR: four bytes, of which the second is the order of bytes (0: big endian), then seconds and nanoseconds.
-    """
-    seconds, nanoseconds = _STAMP[message[1] == 0].unpack_from(message, 4)
-    return int(seconds) * 1_000_000_000 + int(nanoseconds)
