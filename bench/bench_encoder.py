@@ -16,9 +16,8 @@ from bench import gaze_runs
 from bench import gaze_scenarios as scenarios
 from bench.encoder_readings import RenderedRooms
 from bench.gaze_runs import Setting
-from bench.heads import simulated
+from bench.heads import identified, identify
 from bench.results import Row
-from vergence_rig.rig import default_rig
 from vergence_rig.servo import SG90
 from vergence_sim.parameters import SimParameters
 
@@ -33,7 +32,8 @@ WITHOUT = "joints alone"
 
 def run(say: Say) -> list[Row]:
     """Run every trial with and without the encoder and return the rows."""
-    rig = simulated(default_rig()).with_servos(SG90)
+    identify(say)
+    rig = identified().with_servos(SG90)
     readings, errors_rad = [], []
     said: dict[bool, list[np.ndarray]] = {True: [], False: []}
     distances: list[float] = []

@@ -13,6 +13,7 @@ from bench import gaze_figures as figures
 from bench.gaze_figures import DEFAULT
 from bench.gaze_runs import SERVOS, Setting
 from bench.gaze_table import table
+from bench.heads import identify
 from bench.results import Row
 from vergence_gaze.law_registry import law_names
 
@@ -52,6 +53,7 @@ def jobs() -> list[tuple[Part, Setting]]:
 
 def run(say: Callable[[str], None]) -> list[Row]:
     """Run every part and return all rows."""
+    identify(say)
     rows = figures.step_cost_rows()
     todo = jobs()
     with ProcessPoolExecutor(max_workers=min(len(todo), os.cpu_count() or 1)) as pool:

@@ -16,7 +16,7 @@ from bench import gaze_scenarios as scenarios
 from bench.gaze_figures import STEADY_FROM_S, StaticFigures, onset_s, quantile, steady_error_deg
 from bench.gaze_graph_head import SERVO, TARGET, ProcessHead, open_head
 from bench.gaze_runs import Realism, Scenario, Setting, Trace
-from bench.heads import joints_of
+from bench.heads import identify, joints_of
 from bench.results import Row
 from vergence_bringup.ros.simulated_head import BOX_RATE_HZ, FRAME_RATE_HZ
 
@@ -41,6 +41,7 @@ def run(say: Callable[[str], None]) -> list[Row]:
     ]
     names = ("at rest, by class", "at rest, by two clicks", "out of view", "hidden for a second", "at 20 degrees/s")
     real: list[list[Trace]] = []
+    identify(say)
     with open_head() as head:
         visits = (
             head.at_rest,

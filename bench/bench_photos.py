@@ -16,6 +16,7 @@ from typing import TypeVar
 import cv2
 
 from bench import photos_contrast, photos_disparity, photos_figures, photos_scenes
+from bench.heads import identify
 from bench.photos_data import NoPhotographsError, pair_names
 from bench.photos_trials import run as run_trial
 from bench.results import Row, table
@@ -49,6 +50,7 @@ def run(say: Callable[[str], None], clicks: int | None = None) -> list[Row]:
 
 
 def _scene_rows(say: Callable[[str], None]) -> list[Row]:
+    identify(say)
     of_a_room = sum(photos_scenes.CLICKS_OF_A_ROOM.values())
     outcomes = outcomes_of(photos_scenes.run, photos_scenes.trials(), of_a_room, "clicks in rooms", say)
     for line in photos_scenes.failures(outcomes):

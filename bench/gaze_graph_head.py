@@ -10,7 +10,7 @@ import numpy.typing as npt
 from sensor_msgs.msg import JointState
 
 from bench.gaze_runs import Scenario, Trace, travel_s
-from bench.heads import simulated
+from bench.heads import identified, simulated
 from bench.results import OUT_DIR
 from vergence_bringup.demo.ros.recorder import Recorder, Stamped
 from vergence_bringup.demo.ros.stage import RoomStage, class_goal
@@ -20,7 +20,7 @@ from vergence_common.domains import own_domain
 from vergence_common.stamps import to_seconds
 from vergence_msgs.action import LookAt
 from vergence_msgs.msg import BoxVergence
-from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
+from vergence_rig.rig import JOINT_NAMES, Rig
 from vergence_rig.rig_file import write_rig
 
 Array = npt.NDArray[np.float64]
@@ -32,10 +32,10 @@ _LIMIT_S = 10.0
 
 
 class ProcessHead:
-    """One head at a time; `open_head` makes it. Times of traces count from when the goal was sent."""
+    """One head at a time, as it is built; `open_head` makes it. Times of traces count from when the goal was sent."""
 
-    def __init__(self, recorder: Recorder, nodes: ProcessGroup, rig: Rig) -> None:
-        self._recorder, self._check_alive, self._rig = recorder, nodes.check, rig
+    def __init__(self, recorder: Recorder, nodes: ProcessGroup, built: Rig) -> None:
+        self._recorder, self._check_alive, self._built = recorder, nodes.check, built
         self._stage = RoomStage(recorder, nodes.check, ("target", "occluder"))
         self._joints = recorder.record(JointState, "ground_truth/joint_states", nodes.check)
         self._stage.wait_until_ready()
@@ -120,7 +120,7 @@ class ProcessHead:
         recorder = self._recorder
         states = [e for e in recorder.states if 0.0 <= e.arrival_s - began_s <= duration_s]
         time_s = np.array([entry.arrival_s - began_s for entry in states])
-        joints = _at(time_s, began_s, self._joints, lambda message: self._rig.eye_angles(_joints_of(message)))
+        joints = _at(time_s, began_s, self._joints, lambda message: self._built.eye_angles(_joints_of(message)))
         wanted = _at(time_s, began_s, recorder.truths, _wanted_of)
         pans_left, pans_right, tilts = joints.T
         errors = wanted - np.column_stack([0.5 * (pans_left + pans_right), pans_right - pans_left, tilts])
@@ -141,24 +141,24 @@ class ProcessHead:
         """Return how long the servos need from where they are at the first result; NaN for none."""
         if not math.isfinite(first_result_s):
             return math.nan
-        return travel_s(errors_rad[min(int(np.searchsorted(time_s, first_result_s)), time_s.size - 1)], self._rig)
+        return travel_s(errors_rad[min(int(np.searchsorted(time_s, first_result_s)), time_s.size - 1)], self._built)
 
 
 @contextlib.contextmanager
 def open_head() -> Iterator[ProcessHead]:
     """Start a head of its own DDS domain and end it."""
-    rig = simulated(default_rig())
+    rig = identified()
     path = OUT_DIR / "gaze_graph_rig.yaml"
     write_rig(path, rig)
     with (
         own_domain() as domain,
         ProcessGroup(OUT_DIR / "gaze_graph_logs", {"ROS_DOMAIN_ID": str(domain)}) as nodes,
     ):
-        for name, command in simulated_head(path).items():
+        for name, command in simulated_head(path, simulated_time=False, **{"head.camera_info": "none"}).items():
             nodes.start(name, command)
         recorder = Recorder(domain)
         try:
-            yield ProcessHead(recorder, nodes, rig)
+            yield ProcessHead(recorder, nodes, simulated(rig))
         finally:
             recorder.close()
 

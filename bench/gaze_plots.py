@@ -10,6 +10,7 @@ import numpy as np
 from bench import gaze_runs
 from bench import gaze_scenarios as scenarios
 from bench.gaze_runs import Scenario, Setting, Trace
+from bench.heads import identify
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
@@ -82,6 +83,7 @@ def pursuit_picture(path: Path) -> None:
 def main(folder: Path) -> int:
     """Write the pictures into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
+    identify(print)
     steps_picture(folder / "control_steps.png")
     pursuit_picture(folder / "control_pursuit.png")
     return 0

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from bench.heads import joints_of, simulated
+from bench.heads import identified, joints_of
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import BoxSighting, EyeRotationObservation, Observation
 from vergence_gaze.goals.goal import Goal, GoalKind
@@ -168,7 +168,7 @@ class SimulatedHead(FakeHead):
         self._simulator = world()
         self.built = self._simulator.head.real
         super().__post_init__()
-        cameras = CameraModel(self.built.left_camera), CameraModel(self.built.right_camera)
+        cameras = CameraModel(self.rig.left_camera), CameraModel(self.rig.right_camera)
         self._images = eye_images(self.rig, cameras)
         self._posed_at = math.nan
 
@@ -201,13 +201,13 @@ def run(
     realism = Realism() if realism is None else realism
     random = np.random.default_rng(scenario.seed + 7919)
     servo = SERVOS[setting.servo]
-    rig: Rig = simulated(default_rig()).with_servos(servo)
+    rig: Rig = identified().with_servos(servo)
     head = SimulatedHead(
         rig,
         scenario.target,
         seeing_of(scenario, setting, realism, random),
         scenario.seed,
-        joints_of(rig, scenario.start_rad),
+        joints_of(world().head.real, scenario.start_rad),
         lambda time_s: time_s >= 0.0 and scenario.visible(time_s),
         scenario.mistaken,
         {name: real_servo(servo, realism.servo_spread, random) for name, _ in rig.joints.items()},

@@ -1,8 +1,9 @@
-"""The head of the closed-loop benchmarks: metric and controller are given its own description, as if identified."""
+"""The head of the closed-loop benchmarks: the default simulated one, and what metric and controller know of it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 
+from bench.geometry_heads import found_rig, identify_head
 from vergence_rig.geometry import EyeAngles
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import JOINT_NAMES, Rig, default_rig
@@ -12,6 +13,17 @@ from vergence_sim.heads import HeadParameters, simulated_head
 def simulated(rig: Rig) -> Rig:
     """Return the default simulated head, with the servos and joint limits of `rig`."""
     return simulated_head(HeadParameters(), rig)
+
+
+def identify(say: Callable[[str], None]) -> None:
+    """Run `vergence identify` for the default simulated head, for `identified` in this and other processes."""
+    say("identifying the head")
+    identify_head(HeadParameters().seed)
+
+
+def identified() -> Rig:
+    """Return what `identify` found of the default simulated head, its cameras without a calibration."""
+    return found_rig(HeadParameters().seed)
 
 
 @lru_cache(maxsize=1)

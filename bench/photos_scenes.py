@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.gaze_scenarios import in_view_start, place
-from bench.heads import joints_of, simulated
+from bench.heads import identified, joints_of, simulated
 from bench.photos_lockstep import Lockstep, record
 from bench.photos_trials import AWAKE_S
 from bench.photos_verdict import DURATION_S, REST_S, Verdict, verdict_of
@@ -101,12 +101,12 @@ def trials() -> list[SceneTrial]:
 def run(trial: SceneTrial) -> SceneOutcome:
     """Run a trial."""
     cv2.setNumThreads(1)
-    rig, random = simulated(default_rig()), np.random.default_rng([trial.seed, 32])
-    parameters = SimParameters.of({"seed": trial.seed, "world.seed": trial.room})
-    with closing(Simulator(parameters, rig, head=rig)) as simulator:
+    rig, head, random = identified(), simulated(default_rig()), np.random.default_rng([trial.seed, 32])
+    parameters = SimParameters.of({"seed": trial.seed, "world.seed": trial.room, "head.camera_info": "none"})
+    with closing(Simulator(parameters, rig, head=head)) as simulator:
         simulator.place_target(trial.thing, trial.centre_m)
         point_m = np.asarray(simulator.truth().target_point_m, np.float64)
-        settle(simulator, joints_of(rig, in_view_start(point_m, random)), random)
+        settle(simulator, joints_of(head, in_view_start(point_m, random)), random)
         lockstep = Lockstep(simulator, rig)
         moment_s = float(random.uniform(0.0, 1.0 / simulator.parameters.camera.frame_rate_hz))
         lockstep.advance_to(simulator.time_s + AWAKE_S + moment_s)

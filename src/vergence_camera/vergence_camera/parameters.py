@@ -97,7 +97,7 @@ class CameraParameters(Parameters):
         "", "full name of the other eye's camera node; empty compares the two cameras not at all", read_only=True
     )
     max_skew_s: float = parameter(
-        0.02,
+        0.035,
         "largest time between the two eyes' frames; a larger one is reported, since the metric nodes do not pair them",
         unit="s",
         minimum=0.0,

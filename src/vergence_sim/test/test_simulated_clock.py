@@ -227,3 +227,14 @@ def test_the_rate_is_of_the_last_seconds_and_zero_where_time_stands() -> None:
         clock.advance(number * 0.04)
     assert clock.rate(99 * 0.04) == pytest.approx(0.5)
     assert clock.rate(20.0) == 0.0
+
+
+def test_an_image_between_two_of_the_other_eye_is_in_one_pair() -> None:
+    clock, ms = clock_of(), 1_000_000
+    for number in range(1, 5):
+        # 24 ms after the left image and 24 ms before the next one: the metric pairs it with one of them.
+        clock.add_image("left", number * 48 * ms, 0.0)
+        clock.answer("metric", number * 48 * ms, 0.0)
+        clock.add_image("right", number * 48 * ms + 24 * ms, 0.0)
+    clock.add_image("left", 5 * 48 * ms, 0.0)
+    assert not clock.due

@@ -169,6 +169,7 @@ class SimulatedClock:
         left_ns, right_ns = self._images_ns.get("left"), self._images_ns.get("right")
         if left_ns is None or right_ns is None or abs(left_ns - right_ns) > self._skew_ns:
             return
+        self._images_ns.clear()  # an image is in one pair
         pairs = self._sequences[PAIRS]
         pairs.add(left_ns)
         for name, stamp_ns in self._answers_ns.items():

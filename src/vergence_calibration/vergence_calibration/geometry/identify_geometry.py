@@ -19,6 +19,7 @@ from vergence_calibration.geometry.acceptance import (
 from vergence_calibration.geometry.bundle import BundleAdjustment, Constraint, Solution
 from vergence_calibration.geometry.features import Features, features, matches, neighbours, tracks
 from vergence_calibration.geometry.poses import PoseParameters, planned_poses, visited
+from vergence_calibration.geometry.refinement import refined
 from vergence_calibration.geometry.unknowns import NAMES, Prior, index, prior_of, rig_of
 from vergence_calibration.geometry.views import HeadViews, Observations, Poses
 from vergence_calibration.identification.axis_log import EYES, EyeCamera, IdentifyError
@@ -108,18 +109,31 @@ def identify_geometry(
     look = head.look(first)
     cameras = {eye: _sized(cameras[eye], look.sizes_px[eye], eye) for eye in EYES}
     found: list[Features] = []
+    pictures: list[Image] = []
     joints_rad = [[float(angle) for angle in look.joints_rad]]
     for pose in planned:
         look = head.look(pose)
         joints_rad.append([float(angle) for angle in look.joints_rad])
+        pictures += [look.pictures[eye] for eye in EYES]
         found += [features(look.pictures[eye]) for eye in EYES]
         scales = [look.sizes_px[eye][0] / look.pictures[eye].shape[1] for eye in EYES]
     check_texture(found)
     poses = visited(rig, joints_rad[1:], joints_rad[0])
-    seen = _in_whole_images(_tracked(found, rig, cameras, poses), scales, cameras)
+    sightings = _tracked(found, rig, cameras, poses)
+    whole = _in_whole_images(sightings, scales, cameras)
+    known = np.asarray(np.isfinite(whole).all(axis=1))
+    sightings = sightings.kept(known)
+    seen = replace(sightings, pixels=whole[known])
     check_sightings(seen, len(found))
     progress(f"  {int(seen.point.max()) + 1} things found again from several poses, {len(seen.view)} sightings")
-    return solved(rig, cameras, poses, seen, constraints)
+
+    def refine(by_direction: Array) -> Observations:
+        fitting = refined(pictures, sightings, by_direction / np.asarray(scales)[sightings.view % 2, None, None])
+        check_sightings(fitting, len(found))
+        progress(f"  in {len(fitting.view)} of them one patch of each thing fits")
+        return replace(fitting, pixels=_in_whole_images(fitting, scales, cameras))
+
+    return solved(rig, cameras, poses, seen, constraints, refine)
 
 
 def solved(
@@ -128,8 +142,12 @@ def solved(
     poses: Poses,
     seen: Observations,
     constraints: tuple[Constraint, ...] = (),
+    refine: Callable[[Array], Observations] | None = None,
 ) -> FoundGeometry:
-    """Return the geometry that explains sightings, as `identify_geometry`. Raises IdentifyError."""
+    """Return the geometry that explains sightings, as `identify_geometry`. Raises IdentifyError.
+
+    `refine` returns the sightings anew by how they move with their directions (N, 2, 2), `project`'s of a first result.
+    """
     views = HeadViews(rig, cameras, poses)
     prior = prior_of(rig, cameras)
     before = BundleAdjustment(views, seen, prior, points_only=True)
@@ -138,6 +156,11 @@ def solved(
     solution = adjustment.solve(*adjustment.start())
     check_agreement(solution)
     check_joints(prior, solution)
+    if refine is not None:
+        _, _, by_point = views.project(solution.vector, solution.points, seen)
+        seen = refine(by_point[:, :, :2])
+        adjustment = BundleAdjustment(views, seen, prior, constraints)
+        solution = adjustment.solve(*adjustment.start())
     kept = _not_seen(prior, solution)
     learnt = replace(
         prior,
@@ -177,16 +200,14 @@ def _tracked(found: Sequence[Features], rig: Rig, cameras: Mapping[str, EyeCamer
     return tracks(found, pairs)
 
 
-def _in_whole_images(seen: Observations, scales: Sequence[float], cameras: Mapping[str, EyeCamera]) -> Observations:
-    """Return sightings in pixels of the whole images, without the lens distortion of calibrated cameras."""
+def _in_whole_images(seen: Observations, scales: Sequence[float], cameras: Mapping[str, EyeCamera]) -> Array:
+    """Return pixels (N, 2) of the whole images, without the lens distortion of calibrated cameras; NaN beyond it."""
     pixels = (seen.pixels + 0.5) * np.asarray(scales)[seen.view % 2, None] - 0.5
     for number, eye in enumerate(EYES):
         if cameras[eye].calibrated:
             mine, model = seen.view % 2 == number, cameras[eye].model
             pixels[mine] = model.undistort(pixels[mine]) * (model.fx_px, model.fy_px) + (model.cx_px, model.cy_px)
-    known = np.isfinite(pixels).all(axis=1)
-    _, point = np.unique(seen.point[known], return_inverse=True)
-    return Observations(seen.view[known], point, pixels[known])
+    return pixels
 
 
 def _sized(camera: EyeCamera, size_px: tuple[int, int], eye: str) -> EyeCamera:

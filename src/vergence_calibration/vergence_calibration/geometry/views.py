@@ -46,6 +46,11 @@ class Observations:
     point: Indices
     pixels: Array
 
+    def kept(self, which: npt.NDArray[np.bool_]) -> "Observations":
+        """Return some of the sightings (N,), their points numbered anew."""
+        _, point = np.unique(self.point[which], return_inverse=True)
+        return Observations(self.view[which], point, self.pixels[which])
+
 
 @dataclass(frozen=True)
 class Points:

@@ -95,6 +95,7 @@ class GazeControllerNode(Node):
         self.create_service(SetBool, "~/enable", self._on_enable)
         self.create_service(Trigger, "~/stop", self._on_stop)
         self._period_s, self._resting = 1.0 / values.control_rate_hz, False
+        self._cycled_s = math.nan
         self._timer = self.create_timer(self._period_s, self._cycle)
 
     @property
@@ -162,6 +163,11 @@ class GazeControllerNode(Node):
 
     def _cycle(self) -> None:
         now_s = self._now_s()
+        if now_s == self._cycled_s:
+            # rclpy's events executor may call a due timer twice, which then leaves out its next period.
+            self._timer.reset()
+            return
+        self._cycled_s = now_s
         arrived, self._arrived = self._arrived, []
         self._cycles += 1
         if not self._controller.rests(now_s) or any(self._read):

@@ -227,7 +227,8 @@ class BoxMetricNodeParameters(StereoParameters):
     )
     niceness: int = parameter(
         15,
-        "niceness of the measuring thread, as of nice(1): with a higher value other nodes on the same core go first",
+        "niceness of the measuring thread, as of nice(1): with a higher value other nodes on the same core go first; "
+        "0 in simulated time, which waits for it",
         minimum=0,
         maximum=19,
         read_only=True,

@@ -39,8 +39,9 @@ class PairingParameters(Parameters):
     """How left and right frames become pairs; the group `pair.`."""
 
     slop_s: float = parameter(
-        0.02,
-        "largest difference of the two stamps of a pair, inclusive; free-running cameras differ by up to half a period",
+        0.035,
+        "largest difference of the two stamps of a pair, inclusive; free-running cameras differ by up to half a period,"
+        " and webcams halve their rate in dim light: this is enough for 15 Hz",
         unit="s",
         minimum=0.0,
         maximum=10.0,

@@ -73,9 +73,9 @@ class BoxMetricNode(MetricNode):
         self._vision_publishers = [
             self._output(qos, vision, f"vergence/{eye}_detections") for eye in EYES if vision is not None
         ]
-        self._worker: LatestWorker[ImagePair] = LatestWorker(
-            self._measure, self._on_failure, "measure", settings.niceness
-        )
+        # Simulated time stands until this is done: everything waits for it then.
+        niceness = 0 if self.get_parameter("use_sim_time").value else settings.niceness
+        self._worker: LatestWorker[ImagePair] = LatestWorker(self._measure, self._on_failure, "measure", niceness)
         pairing = self._settings.get(PairingParameters)
         self._stereo = StereoInput(
             self, settings, pairing, diagnostics, qos, self._on_pair, self._rig, images=self._images
