@@ -2,9 +2,12 @@
 
 import argparse
 import importlib
+import os
 import pkgutil
+import platform
 import sys
 import time
+from pathlib import Path
 
 import bench
 from bench import results
@@ -15,12 +18,23 @@ def names() -> list[str]:
     return sorted(m.name.removeprefix("bench_") for m in pkgutil.iter_modules(bench.__path__) if m.name[:6] == "bench_")
 
 
+def processor() -> str:
+    """Return the processor's name and the number of cores that this process may use."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:  # not Linux
+        lines = []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith(("model name", "Model"))]
+    return f"{named[0] if named else platform.machine()}, {len(os.sched_getaffinity(0))} cores"
+
+
 def main() -> int:
     """Run what the command line asks for; 0 if every benchmark ran."""
     parser = argparse.ArgumentParser(prog="make bench ONLY=NAME", description=__doc__)
     parser.add_argument("--only", choices=names(), metavar="NAME", help=f"one of: {', '.join(names())}")
     chosen = parser.parse_args().only
     failed: list[str] = []
+    print(f"on {processor()}", flush=True)
     for name in [chosen] if chosen else names():
         started = time.monotonic()
         print(f"\n== {name}", flush=True)

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Make .venv and install/ from nothing, or bring them up to date. Idempotent: a second run only compares stamps.
 #   tools/bootstrap.sh run|dev      run: what the nodes need; dev: what tests, lint and benchmarks add
+# What the build needs is installed first; the rest is installed while colcon builds.
 set -euo pipefail
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 cd "$root"
@@ -11,7 +12,7 @@ python="${PYTHON:-python3}"
 # Exact versions, written by tools/lock.sh. Beside an apt ROS those that fit apt's numpy and OpenCV.
 if [ -f "$ros_setup" ]; then lock=requirements/lock_apt.txt; else lock=requirements/lock.txt; fi
 
-say() { printf '\033[1m[setup]\033[0m %s\n' "$*" >&2; }
+say() { printf '\033[1m[setup %3d s]\033[0m %s\n' "$SECONDS" "$*" >&2; }
 fail() { printf '[setup] %s\n' "$*" >&2; exit 1; }
 
 # colcon, CMake and the wheels break on other paths, after minutes or when the first node starts.
@@ -36,28 +37,31 @@ need_tools() {
 }
 
 install_packages() {  # install_packages STAMP REQUIREMENTS...
-  local name="$1" stamp="$venv/.stamp-$1" sum
+  local name="$1" stamp="$venv/.stamp-$1" sum began="$SECONDS"
   shift
   sum="$(cat "$@" "$lock" | sha256sum)"
   [ "$(cat "$stamp" 2>/dev/null)" = "$sum" ] && return 0
   say "installing packages ($name): $*"
   local args=() file
   for file in "$@"; do args+=(-r "$file"); done
-  local progress=on
-  [ -t 2 ] || progress=off
+  local status
+  set +e
   # By the environment, so that what pip builds from source is built with locked versions as well.
   PIP_CONSTRAINT="$lock" PIP_BUILD_CONSTRAINT="$lock" \
-    "$venv/bin/pip" install --disable-pip-version-check --progress-bar "$progress" "${args[@]}" 2>&1 |
-    grep --line-buffered -E '^(Collecting|Installing collected|Successfully|ERROR|error)|[Ee]rror:' |
-    sed -u -E 's/^Collecting ([^ (]+).*/[setup]   fetching \1/; s/^(Installing collected packages).*/[setup]   installing/; s/^Successfully installed.*/[setup]   done/' >&2 ||
-    true
-  [ "${PIPESTATUS[0]}" -eq 0 ] || fail "pip could not install $*: see the lines above"
+    "$venv/bin/pip" install --disable-pip-version-check --progress-bar off "${args[@]}" 2>&1 |
+    grep --line-buffered -E '^(Collecting|Installing collected|ERROR|error)|[Ee]rror:' |
+    sed -u -E 's/^Collecting ([^ (]+).*/[setup]   fetching \1/; s/^(Installing collected packages).*/[setup]   unpacking/' >&2
+  status="${PIPESTATUS[0]}"
+  set -e
+  [ "$status" -eq 0 ] || fail "pip could not install $*: see the lines above"
   printf '%s' "$sum" >"$stamp"
+  say "installed packages ($name) in $((SECONDS - began)) s"
 }
 
 make_venv() {
   if [ ! -x "$venv/bin/python" ]; then
     need_tools
+    say "a first set-up takes about two minutes, and longer where packages are not in pip's cache yet"
     say "creating $venv with $("$python" --version)"
     if [ -f "$ros_setup" ]; then
       "$python" -m venv --system-site-packages "$venv"
@@ -68,10 +72,17 @@ make_venv() {
   if [ -f "$ros_setup" ]; then
     "$venv/bin/python" -c 'import aiohttp, cv2, numpy, yaml' 2>/dev/null ||
       fail "ROS is here, but not what its packages need: apt install python3-aiohttp python3-numpy python3-opencv python3-yaml"
+  else
+    install_packages ros requirements/ros.txt
+    "$venv/bin/python" tools/mend_wheel_paths.py "$venv"
+  fi
+}
+
+install_the_rest() {
+  if [ -f "$ros_setup" ]; then
     install_packages run requirements/beside_apt.txt
   else
-    install_packages ros requirements/ros.txt requirements/run.txt requirements/beside_apt.txt
-    "$venv/bin/python" tools/mend_wheel_paths.py "$venv"
+    install_packages run requirements/run.txt requirements/beside_apt.txt
   fi
   [ "$level" = dev ] && install_packages dev requirements/dev.txt
   return 0
@@ -91,6 +102,7 @@ build() {
   local sum stamp="$root/install/.stamp"
   sum="$(source_sum)"
   [ "$(cat "$stamp" 2>/dev/null)" = "$sum" ] && return 0
+  local began="$SECONDS"
   say "building the workspace with colcon (a first build takes about a minute)"
   set +u
   if [ -f "$ros_setup" ]; then . "$ros_setup"; fi
@@ -100,10 +112,12 @@ build() {
   export CMAKE_PREFIX_PATH="${CMAKE_PREFIX_PATH:+$CMAKE_PREFIX_PATH:}$venv"
   export PYTHONWARNINGS="ignore::DeprecationWarning,ignore:::setuptools.command.install,ignore:::setuptools.command.develop,ignore:::pkg_resources"
   find src -maxdepth 2 -name '*.egg-info' -type d -exec rm -rf {} + 2>/dev/null || true
+  # Else colcon has make wait while the machine is busy, which pip keeps it.
+  export MAKEFLAGS="${MAKEFLAGS:--j$(getconf _NPROCESSORS_ONLN)}"
   mkdir -p log
   # By this Python, which the executables then start with: apt's colcon alone would start them without this environment.
   command -v colcon >/dev/null || fail "no colcon: apt install python3-colcon-common-extensions"
-  if ! python "$(command -v colcon)" --log-base log build --base-paths src --symlink-install --executor sequential \
+  if ! python "$(command -v colcon)" --log-base log build --base-paths src --symlink-install \
     --event-handlers console_start_end+ desktop_notification- status- \
     --cmake-args -DBUILD_TESTING=OFF "-DPython3_EXECUTABLE=$venv/bin/python" "-DPYTHON_EXECUTABLE=$venv/bin/python" \
     >log/bootstrap.txt 2>&1; then
@@ -111,8 +125,12 @@ build() {
     fail "the build failed: the whole output is in log/bootstrap.txt"
   fi
   printf '%s' "$sum" >"$stamp"
-  say "built: $(find install -maxdepth 1 -name 'vergence*' | wc -l) packages"
+  say "built $(find install -maxdepth 1 -name 'vergence*' | wc -l) packages in $((SECONDS - began)) s"
 }
 
 make_venv
+install_the_rest &
+rest=$!
+trap wait EXIT  # a failed build leaves no half-installed packages behind
 build
+wait "$rest"

@@ -155,3 +155,21 @@ def test_the_distractor_goes_where_it_is_put_and_is_no_target(kind):
     simulator.place_object("distractor", (0.4, 0.02, 0.0))
     assert simulator.truth().left_visible_share < 0.5 < truth.left_visible_share
     assert simulator.truth().target == "cube"
+
+
+def test_shapes_left_out_for_being_outside_the_view_change_no_pixel(seeing, monkeypatch):
+    seeing.place_target("cube", (0.5, 0.22, 0.1))  # cut by the image's edge
+    poses = [
+        {"pan_left": pan, "pan_right": pan - 0.1, "tilt": tilt} for pan in (-0.5, 0.0, 0.5) for tilt in (-0.3, 0.0, 0.4)
+    ]
+
+    def views():
+        for pose in poses:
+            seeing.set_head(pose)
+            yield from (seeing._renderer._drawn(seeing._data, eye).copy() for eye in ("left", "right"))
+
+    without = list(views())
+    shapes_drawn = seeing._renderer._scene.ngeom
+    monkeypatch.setattr("vergence_sim.renderer._outside", lambda model, *_: np.zeros(model.ngeom, bool))
+    assert all(np.array_equal(some, all_) for some, all_ in zip(without, views(), strict=True))
+    assert seeing._renderer._scene.ngeom > shapes_drawn

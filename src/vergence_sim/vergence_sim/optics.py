@@ -92,10 +92,8 @@ class Sensor:
         self._before_noise = rng.bit_generator.state
         for _ in _fields(rng, shape):
             pass  # the generator goes on as if the fields were kept, which would take a hundred megabytes
-        self._noise: list[tuple[Image, Image]] = []
+        self._noise: list[npt.NDArray[np.int8 | np.int16]] = []
         self._noise_sigma = -1.0
-        self._table: npt.NDArray[np.uint8] | None = None
-        self._gains = (-1.0, -1.0, -1.0)
 
     def apply(self, image: Image, parameters: SimParameters) -> Image:
         """Return the sensor's output for an image (h, w, 3) BGR."""
@@ -113,27 +111,22 @@ class Sensor:
         gains = (camera.gain * camera.blue_gain, camera.gain, camera.gain * camera.red_gain)
         if gains == (1.0, 1.0, 1.0):
             return image
-        if gains != self._gains:
-            levels = np.arange(256)[:, None] * np.array(gains)
-            self._table = np.clip(np.rint(levels), 0, 255).astype(np.uint8).reshape(256, 1, 3)
-            self._gains = gains
-        return np.asarray(cv2.LUT(image, self._table), np.uint8)
+        return np.asarray(cv2.transform(image, np.diag(gains)), np.uint8)
 
     def _noisy(self, image: Image, sigma: float) -> Image:
         if sigma != self._noise_sigma:
             again = np.random.default_rng()
             again.bit_generator.state = self._before_noise
-            self._noise = [_parts(field * sigma) for field in _fields(again, self._shape)]
+            self._noise = [_levels(field * sigma) for field in _fields(again, self._shape)]
             self._noise_sigma = sigma
             return_free_memory()
         # A new field for every frame would cost more than rendering: take a random one at a random shift.
-        brighter, darker = self._noise[int(self._rng.integers(_NOISE_BANK))]
+        noise = self._noise[int(self._rng.integers(_NOISE_BANK))]
         row = int(self._rng.integers(image.shape[0]))
         noisy, first = np.empty_like(image), image.shape[0] - row
         for there, taken in ((slice(0, first), slice(row, None)), (slice(first, None), slice(0, row))):
             if row or there.start == 0:
-                cv2.add(image[there], brighter[taken], dst=noisy[there])
-                cv2.subtract(noisy[there], darker[taken], dst=noisy[there])
+                cv2.add(image[there], noise[taken], dst=noisy[there], dtype=cv2.CV_8U)
         return noisy
 
 
@@ -143,7 +136,7 @@ def _fields(rng: np.random.Generator, shape: tuple[int, int]) -> Iterator[npt.ND
         yield rng.standard_normal((*shape, 3), dtype=np.float32)
 
 
-def _parts(levels: npt.NDArray[np.float32]) -> tuple[Image, Image]:
-    """Return the positive and the negative part of a noise as bytes: an addition is then one call each."""
-    rounded = np.clip(np.rint(levels), -255, 255)
-    return np.maximum(rounded, 0).astype(np.uint8), np.maximum(-rounded, 0).astype(np.uint8)
+def _levels(noise: npt.NDArray[np.float32]) -> npt.NDArray[np.int8 | np.int16]:
+    """Return a noise in whole grey levels, in bytes if they are enough."""
+    levels = np.clip(np.rint(noise), -255, 255)
+    return levels.astype(np.int8 if np.abs(levels).max() <= 127 else np.int16)

@@ -1,6 +1,9 @@
 """Offscreen rendering of both eyes with MuJoCo, on EGL or OSMesa."""
 
+import ctypes
+import math
 import os
+import threading
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,7 +12,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from vergence_sim.model_builder import HIDDEN_GROUP
+
 Image = npt.NDArray[np.uint8]
+
+_GL_RGBA, _GL_UNSIGNED_BYTE = 0x1908, 0x1401
+# Simulators share a model, whose shapes outside a view are hidden while that view's scene is made.
+_MODEL_LOCK = threading.Lock()
 
 
 class RenderError(RuntimeError):
@@ -26,6 +35,7 @@ class EyeRenderer:
             self._context = mujoco.GLContext(width_px, height_px)
             self._context.make_current()
             self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+            self._gl = _opengl()
         except Exception as error:
             raise RenderError(
                 f"MuJoCo cannot render offscreen with MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}: {error}; install "
@@ -44,9 +54,6 @@ class EyeRenderer:
         self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZERONEAR
         self._viewports = {camera: mujoco.MjrRect(0, 0, *size) for camera, size in sizes_px.items()}
         self._views: dict[str, tuple[bytes, Image]] = {}
-        self._pictures = {
-            camera: np.empty((height, width, 3), np.uint8) for camera, (width, height) in sizes_px.items()
-        }
 
     def render(self, data: Any, camera: str) -> Image:
         """Return the view of a camera; the same array again, not to be changed, while nothing has moved."""
@@ -61,14 +68,34 @@ class EyeRenderer:
     def _drawn(self, data: Any, camera: str) -> Image:
         self._context.make_current()
         self._camera.fixedcamid = self._model.camera(camera).id
-        mujoco.mjv_updateScene(
-            self._model, data, self._options, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
-        )
-        viewport, rgb = self._viewports[camera], self._pictures[camera]
+        viewport = self._viewports[camera]
+        self._update_scene(data, viewport.width / viewport.height)
         mujoco.mjr_render(viewport, self._scene, self._mjr)
-        mujoco.mjr_readPixels(rgb, None, viewport, self._mjr)
-        # OpenGL's rows run upwards and its channels are RGB.
-        return np.asarray(cv2.cvtColor(cv2.flip(rgb, 0), cv2.COLOR_RGB2BGR), np.uint8)
+        # OpenGL's rows run upwards.
+        return np.asarray(cv2.flip(self._read(viewport), 0), np.uint8)
+
+    def _update_scene(self, data: Any, aspect: float) -> None:
+        groups = self._model.geom_group
+        with _MODEL_LOCK:
+            visible = groups.copy()
+            groups[_outside(self._model, data, self._camera.fixedcamid, aspect)] = HIDDEN_GROUP
+            mujoco.mjv_updateScene(
+                self._model, data, self._options, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
+            )
+            groups[:] = visible
+
+    def _read(self, viewport: Any) -> Image:
+        """Return the pixels just drawn (h, w, 3) BGR, rows upwards."""
+        if self._mjr.offSamples:
+            rgb = np.empty((viewport.height, viewport.width, 3), np.uint8)
+            mujoco.mjr_readPixels(rgb, None, viewport, self._mjr)
+            return np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), np.uint8)
+        # In the format in which they are stored: Mesa takes ten times as long to turn them into RGB.
+        rgba = np.empty((viewport.height, viewport.width, 4), np.uint8)
+        self._gl.glReadPixels(
+            0, 0, viewport.width, viewport.height, _GL_RGBA, _GL_UNSIGNED_BYTE, rgba.ctypes.data_as(ctypes.c_void_p)
+        )
+        return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2BGR), np.uint8)
 
     def close(self) -> None:
         """Free the context and its buffers; idempotent."""
@@ -77,3 +104,22 @@ class EyeRenderer:
             self._mjr.free()
             self._context.free()
             self._context = None
+
+
+def _opengl() -> Any:
+    """Return the OpenGL library that MuJoCo draws with."""
+    from OpenGL import platform  # MuJoCo's own binding; where there is no OpenGL it cannot be imported
+
+    return platform.PLATFORM.GL
+
+
+def _outside(model: Any, data: Any, camera_id: int, aspect: float) -> npt.NDArray[np.bool_]:
+    """Return which shapes' bounding spheres are wholly outside a camera's view (N,); OpenGL would clip each."""
+    points = (data.geom_xpos - data.cam_xpos[camera_id]) @ data.cam_xmat[camera_id].reshape(3, 3)
+    radii = np.where(model.geom_rbound > 0, model.geom_rbound, np.inf)  # planes have none
+    ahead = -points[:, 2]
+    outside = ahead < -radii
+    half_height = math.tan(0.5 * math.radians(model.cam_fovy[camera_id]))
+    for across, half in ((points[:, 0], half_height * aspect), (points[:, 1], half_height)):
+        outside |= np.abs(across) - half * ahead > radii * math.hypot(1.0, half)
+    return np.asarray(outside, np.bool_)

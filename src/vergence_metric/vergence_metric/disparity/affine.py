@@ -181,7 +181,7 @@ class _Window:
     def seen(self, right: Strip, point_px: tuple[float, float], warp: Warp, gain: float) -> Matrix:
         """Return what the right image shows at the warped offsets (N)."""
         # remap of OpenCV 4 rounds to a grid, that of OpenCV 5 does not: round first, make good what that misses.
-        maps, missed = [], np.zeros(())
+        maps, missed = [], []
         for (across, down, shift), at, first, gradient in zip(
             warp, point_px, (right.x0, right.y0), self.gradients, strict=True
         ):
@@ -189,10 +189,15 @@ class _Window:
                 (_REMAP_STEPS * down) * self.offsets[1] + _REMAP_STEPS * (shift + at - first)
             )
             near = np.rint(steps)
-            maps.append(np.multiply(near, 1.0 / _REMAP_STEPS, dtype=np.float32, casting="same_kind"))
-            missed = missed + (steps - near) * gradient
+            maps.append(near.astype(np.float32) * np.float32(1.0 / _REMAP_STEPS))
+            steps -= near
+            steps *= gradient
+            missed.append(steps)
         sampled = cv2.remap(right.grey, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return np.asarray((sampled + (gain / _REMAP_STEPS) * missed).ravel())
+        seen = missed[0] + missed[1]
+        seen *= gain / _REMAP_STEPS
+        seen += sampled
+        return np.asarray(seen.ravel())
 
     def deviation(self, residual: Matrix) -> float:
         """Return the standard deviation of the horizontal translation [px, times gain] by the residuals (N).

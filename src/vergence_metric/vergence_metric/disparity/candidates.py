@@ -54,7 +54,8 @@ class Profile:
     @cached_property
     def _best_near(self) -> list[float]:
         """The best value within a column of each column, from one before the first to one after the last."""
-        padded = np.pad(self.values, 2, constant_values=-1.0)
+        padded = np.full(len(self.values) + 4, -1.0, self.values.dtype)
+        padded[2:-2] = self.values  # np.pad takes ten times as long
         best: list[float] = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:]).tolist()
         return best
 

@@ -4,7 +4,7 @@
 """
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 CHOICE = (-2.81, 1.16, 3.84, 2.94)
 """Conditional logit of a candidate against none: bias, then the weights of `Support` in its order."""
@@ -81,7 +81,7 @@ class Evidence:
 
 def choice_score(support: Support) -> float:
     """Return the log odds of a candidate against none of the candidates."""
-    return _weighed(CHOICE, astuple(support))
+    return _weighed(CHOICE, (support.agrees, support.near_share, support.column))
 
 
 def confidence(evidence: Evidence) -> float:
