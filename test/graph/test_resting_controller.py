@@ -52,7 +52,7 @@ def test_measurements_are_subscribed_while_a_goal_needs_them(graph: Any, node: G
 
 
 def test_cycles_are_rare_until_something_reads_the_state(graph: Any, node: GazeControllerNode) -> None:
-    graph.wait_until(lambda: node._timer.timer_period_ns == 100_000_000, "the controller rests")
+    graph.wait_until(lambda: node._cycle_timer.timer.timer_period_ns == 100_000_000, "the controller rests")
     state = graph.message(GazeState, "gaze/state")
-    graph.wait_until(lambda: node._timer.timer_period_ns == 20_000_000, "the full rate")
+    graph.wait_until(lambda: node._cycle_timer.timer.timer_period_ns == 20_000_000, "the full rate")
     assert graph.wait(state).phase_name == "idle"

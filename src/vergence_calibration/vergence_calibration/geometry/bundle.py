@@ -23,7 +23,7 @@ _STEPS = 60
 _LEAST_SCALE_PX = 0.02
 _CONVERGED = 1e-5  # of the cost, relative
 _BEHIND_PX = 1e3
-_SHARED_ERRORS = 3.0  # factor on the variance of sightings, fitted on rendered rooms: of one edge, of one lens
+_SHARED_ERRORS = 6.5  # factor on the variance of sightings, fitted on rendered rooms: of one patch, of one lens
 _FIRST_DAMPING, _MOST_DAMPING = 1e-3, 1e8
 
 
