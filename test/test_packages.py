@@ -19,7 +19,7 @@ ROSDEP_KEYS = {
     "pytest": "python3-pytest",
     "yaml": "python3-yaml",
 }
-NOT_IN_APT = {"mujoco", "onnx", "onnxruntime", "rosbags"}
+NOT_IN_APT = {"OpenGL", "mujoco", "onnx", "onnxruntime", "rosbags"}
 """pip packages: rosdep's keys of these fail where pip refuses to install into the system (PEP 668), so no package names
 them; the nodes that need one say how to install it."""
 OF_ONE_DRIVER = {"adafruit_pca9685", "board", "busio", "lgpio", "pigpio"}

@@ -211,7 +211,9 @@ def test_a_controller_that_is_started_anew(head: Head, browser: Browser) -> None
         await tab.wait_for("document.getElementById('phase').textContent === 'idle'", STARTED_S)
         await tab.wait_for("!document.getElementById('centre').disabled", STARTED_S)
         await tab.click("#hold")
-        await tab.wait_for("document.getElementById('goal').dataset.result", VERGED_S)
+        goal = "document.getElementById('goal')"
+        await tab.wait_for(f"{goal}.matches('.good, .bad')", VERGED_S)
+        assert await tab.value(f"{goal}.dataset.result"), await tab.value(f"{goal}.textContent")
         assert tab.errors == []
         await tab.close()
 

@@ -213,6 +213,17 @@ def test_goals_name_why_they_fail(result: Result) -> None:
         assert run.outcomes[0].reason
 
 
+def test_eyes_that_diverge_a_little_may_be_held_but_not_turned_farther_apart() -> None:
+    # Stopped on their way, one eye may have gone farther than the other.
+    start = {"pan_left": 0.004, "pan_right": -0.004, "tilt": 0.0}
+    for vergence_rad, results in ((0.0, [Result.VERGED]), (-0.05, [Result.UNREACHABLE])):
+        run = Run(rig_with(IDEAL), fixed(0.7, 0.1, 0.0), gaze_parameters(), start_rad=start)
+        goal = Goal(GoalKind.RELATIVE_ANGLES, version_rad=0.0, vergence_rad=vergence_rad, tilt_rad=0.0)
+        run.controller.look_at(goal, run.head.time_s)
+        run.until(3.0)
+        assert [outcome.result for outcome in run.outcomes] == results
+
+
 def test_preempted_cancelled_and_stopped() -> None:
     run = Run(rig_with(SG90), fixed(0.7, 0.1, 0.0), gaze_parameters())
     first, second = run.click(), run.click()

@@ -108,9 +108,14 @@ def _pose(goal: Goal, rig: Rig, parameters: GazeParameters, history: ShaftHistor
     present = history.reported_rad
     eyes = from_version_vergence(*angles)
     joints = np.array([eyes.pan_left_rad, eyes.pan_right_rad, eyes.tilt_rad])
-    if goal.kind is GoalKind.RELATIVE_ANGLES:
+    relative = goal.kind is GoalKind.RELATIVE_ANGLES
+    if relative:
         joints = joints + present
-    if joints[1] - joints[0] < rig.least_vergence_rad - 1e-6:
+    short_rad = rig.least_vergence_rad - float(joints[1] - joints[0])
+    if short_rad > 0.0 and relative and goal.vergence_rad >= 0.0:
+        # Eyes that were stopped on their way may diverge by a little: they are brought to where they may be.
+        joints += np.array([-0.5, 0.5, 0.0]) * short_rad
+    elif short_rad > 1e-6:
         raise GoalError(
             Result.UNREACHABLE,
             f"the vergence must be at least {rig.least_vergence_rad:g} rad: got {joints[1] - joints[0]:.4f}",
