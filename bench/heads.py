@@ -1,7 +1,7 @@
 """The head of the closed-loop benchmarks: the default simulated one, and what metric and controller know of it."""
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 
 from bench.geometry_heads import found_rig, identify_head
 from vergence_rig.geometry import EyeAngles
@@ -16,8 +16,13 @@ def simulated(rig: Rig) -> Rig:
 
 
 def identify(say: Callable[[str], None]) -> None:
-    """Run `vergence identify` for the default simulated head, for `identified` in this and other processes."""
+    """Run `vergence identify` for the default simulated head, once; for `identified` in this and other processes."""
     say("identifying the head")
+    _identify_once()
+
+
+@cache
+def _identify_once() -> None:
     identify_head(HeadParameters().seed)
 
 

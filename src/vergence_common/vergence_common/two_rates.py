@@ -7,15 +7,21 @@ from rclpy.node import Node
 
 
 class TwoRates:
-    """A timer of a node with two periods, the short one at first."""
+    """A timer of a node with two periods, the short one at first; it calls once at each moment of its clock.
+
+    rclpy's events executor may call a due timer twice, which then leaves out its next period. In simulated time, which
+    stands still meanwhile, the second call is told by the clock.
+    """
 
     def __init__(
         self, node: Node, callback: Callable[[], None], fast_s: float, slow_s: float, clock: Clock | None = None
     ) -> None:
         self._periods_ns = {True: round(1e9 * fast_s), False: round(1e9 * slow_s)}
+        self._callback, self._clock = callback, clock or node.get_clock()
+        self._called_ns: int | None = None
         self.fast = True
         """Which period it has."""
-        self.timer = node.create_timer(fast_s, callback, clock=clock)
+        self.timer = node.create_timer(fast_s, self._call, clock=self._clock)
 
     def set_fast(self, fast: bool) -> bool:
         """Use this period from now on; return whether it was the other one. The shorter begins at once."""
@@ -26,3 +32,11 @@ class TwoRates:
         if fast:
             self.timer.reset()
         return True
+
+    def _call(self) -> None:
+        now_ns = self._clock.now().nanoseconds
+        if now_ns == self._called_ns:
+            self.timer.reset()
+            return
+        self._called_ns = now_ns
+        self._callback()

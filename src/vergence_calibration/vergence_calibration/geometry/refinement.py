@@ -45,9 +45,9 @@ def refined(pictures: Sequence[Image], seen: Observations, by_direction: Array) 
     for mine in np.split(order, np.flatnonzero(np.diff(seen.point[order])) + 1):
         first, *others = mine.tolist()
         fits[first] = True
-        back = np.linalg.inv(by_direction[first])
         for other in others:
-            patch = _warped(pictures[seen.view[first]], seen.pixels[first], by_direction[other] @ back)
+            back = by_direction[first] @ np.linalg.inv(by_direction[other])
+            patch = _warped(pictures[seen.view[first]], seen.pixels[first], back)
             place = _fitted(pictures[seen.view[other]], seen.pixels[other], patch)
             if place is not None:
                 pixels[other], fits[other] = place, True
@@ -55,9 +55,8 @@ def refined(pictures: Sequence[Image], seen: Observations, by_direction: Array) 
     return Observations(seen.view, seen.point, pixels).kept(fits)
 
 
-def _warped(picture: Image, pixel: Array, affine: Array) -> Array:
-    """Return the patch about a pixel, its surroundings mapped by an affine matrix (2, 2)."""
-    back = np.linalg.inv(affine)
+def _warped(picture: Image, pixel: Array, back: Array) -> Array:
+    """Return the patch about a pixel, of which steps from its middle are steps in the picture by a matrix (2, 2)."""
     middle = np.full(2, float(_HALF_PX))
     matrix = np.column_stack([back, pixel - back @ middle])
     return np.asarray(

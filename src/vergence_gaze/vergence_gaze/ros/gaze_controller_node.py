@@ -97,7 +97,6 @@ class GazeControllerNode(Node):
         self.create_service(Trigger, "~/stop", self._on_stop)
         period_s = 1.0 / values.control_rate_hz
         self._cycle_timer = TwoRates(self, self._cycle, period_s, max(period_s, _RESTING_PERIOD_S))
-        self._cycled_s = math.nan
 
     @property
     def resolution_rad(self) -> list[float]:
@@ -160,11 +159,6 @@ class GazeControllerNode(Node):
 
     def _cycle(self) -> None:
         now_s = self._now_s()
-        if now_s == self._cycled_s:
-            # rclpy's events executor may call a due timer twice, which then leaves out its next period.
-            self._cycle_timer.timer.reset()
-            return
-        self._cycled_s = now_s
         arrived, self._arrived = self._arrived, []
         self._cycles += 1
         if not self._controller.rests(now_s) or any(self._read):

@@ -137,13 +137,8 @@ class HeadCommands:
         if message is None or reply is None:
             return
         if answer.status == GoalStatus.STATUS_UNKNOWN:
-            reply(
-                Answer(
-                    message.number,
-                    False,
-                    f"{_GAZE} does not have the goal: it rejected it, or was started anew meanwhile",
-                )
-            )
+            text = f"{_GAZE} does not have the goal: it rejected it, or was started anew meanwhile"
+            reply(Answer(message.number, False, text))
             return
         result = answer.result
         name = _result_name(result.result)
