@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import rclpy
 from rclpy.node import Node
@@ -60,7 +61,7 @@ def run_nodes(
     except Exception as error:
         return _bad_input(error)
     nodes: list[Node] = []
-    started = False
+    started = cut_short = False
     try:
         if stop_asked.is_set():
             return 0
@@ -77,18 +78,27 @@ def run_nodes(
     except StartAbandonedError:
         # Its thread holds no hardware; waiting for it, or tearing the interpreter down beside it, would be wrong.
         rclpy.try_shutdown()
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(0)
+        _leave()
     except Exception as error:
-        if stop_asked.is_set() or not rclpy.ok():
+        cut_short = stop_asked.is_set() or not rclpy.ok()
+        if cut_short:
             return 0  # the context was shut down meanwhile: the failure is its consequence
         if not started and isinstance(error, REFUSALS):
             return _bad_input(error)
         raise
     finally:
         _close(nodes)
+        if cut_short:
+            # rclpy's events executor may have been registering a node's callbacks. It loses count of them then, and
+            # aborts the process when it is deleted.
+            _leave()
     return 0
+
+
+def _leave() -> NoReturn:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 def _executable() -> str:
