@@ -23,7 +23,8 @@ def observed(estimator: PlayEstimator, true_half_play: float, reported: list[flo
     shaft = reported[0]
     for i, angle in enumerate(reported):
         shaft = min(max(shaft, angle - true_half_play), angle + true_half_play)
-        estimator.observe(every_s * i, np.full(3, angle), np.full(3, -shaft))
+        estimator.follow(every_s * i, np.full(3, angle))
+        estimator.observe(every_s * i, np.full(3, -shaft))
 
 
 @given(st.floats(0.0, 0.02), st.floats(0.0, 0.02))
@@ -48,9 +49,38 @@ def test_a_move_that_the_image_does_not_show_lies_in_the_play() -> None:
 def test_a_joint_that_was_not_seen_keeps_its_play() -> None:
     estimator = PlayEstimator(np.full(3, 0.01), 0.7)
     for i, angle in enumerate((0.0, 0.1, 0.0)):
-        estimator.observe(0.2 * i, np.full(3, angle), np.array([-angle, math.nan, -angle]))
+        estimator.follow(0.2 * i, np.full(3, angle))
+        estimator.observe(0.2 * i, np.array([-angle, math.nan, -angle]))
     assert estimator.half_play_rad[1] == 0.01
     assert estimator.half_play_rad[0] < 0.01
+
+
+def test_a_joint_that_turned_back_unseen_teaches_nothing() -> None:
+    estimator = PlayEstimator(np.full(3, 0.01), 0.7)
+    shaft, seen_at = 0.0, (0.0, 0.195, 0.190)
+    for i, angle in enumerate((0.0, 0.1, 0.2, 0.195, 0.190)):  # too far, and back by less than the play
+        shaft = min(max(shaft, angle - 0.01), angle + 0.01)
+        estimator.follow(0.1 * i, np.full(3, angle))
+        if angle in seen_at:
+            estimator.observe(0.1 * i, np.full(3, -shaft))
+    np.testing.assert_array_equal(estimator.half_play_rad, 0.01)
+
+
+def test_moves_that_are_lost_add_up() -> None:
+    estimator = PlayEstimator(np.full(3, 0.002), 1.0)
+    observed(estimator, 0.01, [0.0, 0.1, 0.092, 0.084, 0.07])
+    np.testing.assert_allclose(estimator.half_play_rad, 0.01)
+
+
+@given(st.lists(st.floats(-0.2, 0.2), min_size=2, max_size=30), st.floats(0.001, 0.015), st.integers(1, 4))
+def test_play_that_is_as_described_stays_so(angles: list[float], true: float, seen_every: int) -> None:
+    estimator, shaft = PlayEstimator(np.full(3, true), 0.7), angles[0] + 0.3 * true
+    for i, angle in enumerate(angles):
+        shaft = min(max(shaft, angle - true), angle + true)
+        estimator.follow(0.05 * i, np.full(3, angle))
+        if i % seen_every == 0:
+            estimator.observe(0.05 * i, np.full(3, -shaft))
+    np.testing.assert_allclose(estimator.half_play_rad, true, atol=1e-3 + 1e-9)
 
 
 def test_nothing_is_learnt_from_sights_that_are_far_apart() -> None:
@@ -71,7 +101,8 @@ def test_nothing_is_learnt_from_a_target_that_is_seen_to_move() -> None:
     estimator = PlayEstimator(np.full(3, 0.01), 0.7)
     for i in range(12):
         angle = 0.1 * (i // 3 % 2)  # three sights at each place, past which the target moves on
-        estimator.observe(0.05 * i, np.full(3, angle), np.full(3, 0.004 * i - angle))
+        estimator.follow(0.05 * i, np.full(3, angle))
+        estimator.observe(0.05 * i, np.full(3, 0.004 * i - angle))
     np.testing.assert_array_equal(estimator.half_play_rad, 0.01)
 
 

@@ -255,7 +255,7 @@ class TargetTracking(TargetEstimator):
             return False
         at_left, at_right = self._history.shaft_at(stamp_s), self._history.shaft_at(last)
         axes_rad, before_rad = np.array([at_left[0], at_right[1], at_left[2]]), self._history.half_play_rad.copy()
-        self._history.play.observe(stamp_s, self._history.reported_at(stamp_s), seen_rad - axes_rad)
+        self._history.play.observe(stamp_s, seen_rad - axes_rad)
         return bool(np.abs(self._history.half_play_rad - before_rad).max() > _LEARNT_RAD)
 
 

@@ -85,6 +85,7 @@ class ShaftHistory:
         shafts = self._shafts.newest.angles_rad if self.known else angles
         if not self._reported.add_angles(stamp_s, angles):
             return False
+        self.play.follow(stamp_s, angles)
         half_play = self.half_play_rad
         return self._shafts.add_angles(stamp_s, np.minimum(np.maximum(shafts, angles - half_play), angles + half_play))
 
@@ -93,6 +94,7 @@ class ShaftHistory:
         self._reported.clear()
         self._shafts.clear()
         self._commands.clear()
+        self.play.forget_way()
 
     def on_command(self, now_s: float, angles_rad: Array) -> None:
         """Record a command (3,) that is sent now: the joints begin to turn after it by their servos' latency."""
