@@ -1,7 +1,8 @@
 """Heads that are not as drawn: lenses off the axes, mounts turned, zeros and scales off, principal points anywhere.
 
-Ten printed heads, each in a room of its own, in the lockstep simulator: clicks on a cube or a pen at 0.3 to 1.5 m. The
-arms are what metric and controller are given:
+Ten printed heads, each in a room of its own, in the lockstep simulator: clicks on a cube or a pen at 0.3 to 1.5 m. Each
+servo's dead band and backlash are up to a fifth off what it is described with. The arms are what metric and controller
+are given:
 
 - `identified`: what `vergence identify` finds of the head, before which its cameras have no calibration; with
   VERGENCE_GEOMETRY_DESCRIBED=1 the head's own description instead, and nothing is identified;

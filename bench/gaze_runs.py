@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from bench.gaze_trace import Trace
 from bench.heads import identified, joints_of
+from bench.real_servos import SERVO_SPREAD, real_servo
 from vergence_gaze.control.controller import GazeController
 from vergence_gaze.estimation.observations import BoxSighting, EyeRotationObservation, Observation
 from vergence_gaze.goals.goal import Goal, GoalKind
@@ -77,25 +78,12 @@ class Setting:
 class Realism:
     """Seeded differences between the head as described and as it is; all zero is the ideal head."""
 
-    servo_spread: float = 0.2
+    servo_spread: float = SERVO_SPREAD
     noise_px: float = 0.4
     stamp_error_s: float = 0.003
     frame_rate_hz: float = 30.0
     box: Mapping[str, float] = field(
         default_factory=lambda: {"rate_hz": 15.0, "latency_s": 0.04, "noise_px": 1.2, "surface_px": 0.4}
-    )
-
-
-def real_servo(spec: ServoSpec, spread: float, random: np.random.Generator) -> ServoSpec:
-    """Return a servo as it comes out of the box: its figures a seeded share off the data sheet's."""
-    if spec.name == "ideal":
-        return spec
-    off = [1.0 + float(share) for share in random.uniform(-spread, spread, 3)]
-    return spec.replaced(
-        speed_rad_s=spec.speed_rad_s * (1.0 + 0.5 * (off[0] - 1.0)),
-        dead_band_rad=spec.dead_band_rad * off[1],
-        backlash_rad=spec.backlash_rad * off[2],
-        command_latency_s=max(spec.command_latency_s + float(random.uniform(-0.005, 0.005)), 0.0),
     )
 
 

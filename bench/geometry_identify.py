@@ -12,6 +12,7 @@ from contextlib import closing
 
 import numpy as np
 
+from bench.real_servos import with_real_servos
 from bench.results import Row
 from vergence_calibration.geometry.identify_geometry import FoundGeometry, Look, identify_geometry
 from vergence_calibration.geometry.poses import PoseParameters
@@ -28,12 +29,17 @@ REST_S = 0.45  # a look of a running head: its rest, and the wait for the next p
 _UNCALIBRATED = "rig.yaml as shipped"
 
 
+def real_head(seed: int) -> Rig:
+    """Return the printed head of a seed with servos as they come out of the box."""
+    return with_real_servos(printed_head(seed), np.random.default_rng([seed, 43]))
+
+
 class LockstepHead:
     """The simulated head of a seed, as `identify_geometry` turns it."""
 
     def __init__(self, seed: int) -> None:
         parameters = SimParameters.of({"world.seed": seed, "seed": seed, "head.camera_info": "none"})
-        self.rig, self.truth = default_rig(), printed_head(seed)
+        self.rig, self.truth = default_rig(), real_head(seed)
         self.simulator = Simulator(parameters, self.rig, head=self.truth)
 
     def cameras(self) -> Mapping[str, EyeCamera]:

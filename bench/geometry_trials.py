@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from bench.gaze_scenarios import in_view_start, place
 from bench.geometry_heads import found_rig
+from bench.geometry_identify import real_head
 from bench.heads import joints_of
 from bench.photos_lockstep import Lockstep, record
 from bench.photos_scenes import PointOfRoom, settle
@@ -22,9 +23,8 @@ from vergence_rig.camera import CameraModel
 from vergence_rig.eye_image import EyeImage, eye_images
 from vergence_rig.kinematics import Kinematics
 from vergence_rig.rig import CameraSpec, Rig, default_rig
-from vergence_rig.servo import IDEAL
+from vergence_rig.servo import IDEAL, SG90
 from vergence_sim.parameters import SimParameters
-from vergence_sim.printed_head import printed_head
 from vergence_sim.simulator import Simulator
 from vergence_sim.world import EYES
 
@@ -91,7 +91,7 @@ def trials(arm: str, count: int, ideal_servos: bool = False) -> list[GeometryTri
 
 def head_of(trial: GeometryTrial) -> Rig:
     """Return the head that is simulated."""
-    head = printed_head(trial.head)
+    head = real_head(trial.head)
     head = head.with_servos(IDEAL) if trial.ideal_servos else head
     if trial.arm != PRINCIPAL_POINT:
         return head
@@ -114,7 +114,7 @@ def rig_given(trial: GeometryTrial, head: Rig) -> Rig:
     if trial.arm == FOUND:
         found = found_rig(trial.head)
         return found.with_servos(IDEAL) if trial.ideal_servos else found
-    return head
+    return head if trial.ideal_servos else head.with_servos(SG90)
 
 
 @dataclass

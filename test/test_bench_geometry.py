@@ -22,6 +22,7 @@ from bench.geometry_trials import (
 )
 from vergence_rig.rig import default_rig
 from vergence_rig.rig_file import write_rig
+from vergence_rig.servo import SG90
 
 TRIAL = GeometryTrial(IDENTIFIED, False, 0, 0)
 VERGED = GeometryOutcome(TRIAL, 0.5, True, True, False, 0.1, 0.05, (0.505, 0.49, 0.52), "verged")
@@ -34,7 +35,7 @@ def test_every_head_has_its_share_of_the_clicks():
 
 def test_the_arms_give_what_they_say(monkeypatch, tmp_path):
     head = head_of(TRIAL)
-    assert rig_given(TRIAL, head) == head
+    assert rig_given(TRIAL, head) == head.with_servos(SG90)
     undescribed = rig_given(replace(TRIAL, arm=UNCALIBRATED), head)
     assert undescribed.left_mount == default_rig().left_mount
     assert undescribed.zero_sigma_rad > 0
