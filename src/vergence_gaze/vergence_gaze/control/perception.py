@@ -274,13 +274,20 @@ class Perception:
         )
 
     def _on_target(self, now_s: float) -> bool:
-        """Return whether the eyes by now are on the predicted target, with enough certainty."""
-        estimate, joints = self.tracking.estimate(now_s), self.history.shaft_rad
+        """Return whether the eyes by now are on the predicted target, with enough certainty.
+
+        A target at rest must be where the last command sends them, too: one eye may have set off beside it.
+        """
+        estimate = self.tracking.estimate(now_s)
         if estimate is None:
             return False
-        off, sigmas = estimate.joints_rad - joints, estimate.joint_sigmas_rad
+        places = (self.history.shaft_rad,) if estimate.moving else (self.history.shaft_rad, self.history.sent_rad)
+        return all(self._within_limits(estimate, joints_rad) for joints_rad in places)
+
+    def _within_limits(self, estimate: TargetEstimate, joints_rad: Array) -> bool:
+        off, sigmas = estimate.joints_rad - joints_rad, estimate.joint_sigmas_rad
         judged = self._driven if self._driven[:2].all() else self._driven & np.array([False, False, True])
-        vergence = abs(estimate.vergence_rad - float(joints[1] - joints[0]))
+        vergence = abs(estimate.vergence_rad - float(joints_rad[1] - joints_rad[0]))
         direction_error = float(np.abs(off[judged]).max(initial=0.0))
         if vergence > self.judge.enter_rad or direction_error > self.judge.direction_enter_rad:
             return False

@@ -58,8 +58,16 @@ class ShaftHistory:
 
     @property
     def shaft_rad(self) -> Array:
-        """The newest estimated shaft angles (3,)."""
-        return self._shafts.newest.angles_rad
+        """The newest estimated shaft angles (3,), with the play as it is known by now."""
+        return self._carried(self._shafts.newest.angles_rad, self.reported_rad)
+
+    @property
+    def sent_rad(self) -> Array:
+        """Where the shafts (3,) will rest once the newest command has been executed."""
+        return self._carried(self.shaft_rad, self._commands[-1][1]) if self._commands else self.shaft_rad
+
+    def _carried(self, shaft_rad: Array, joint_rad: Array) -> Array:
+        return np.minimum(np.maximum(shaft_rad, joint_rad - self.half_play_rad), joint_rad + self.half_play_rad)
 
     @property
     def half_play_rad(self) -> Array:
@@ -86,8 +94,7 @@ class ShaftHistory:
         if not self._reported.add_angles(stamp_s, angles):
             return False
         self.play.follow(stamp_s, angles)
-        half_play = self.half_play_rad
-        return self._shafts.add_angles(stamp_s, np.minimum(np.maximum(shafts, angles - half_play), angles + half_play))
+        return self._shafts.add_angles(stamp_s, self._carried(shafts, angles))
 
     def clear(self) -> None:
         """Remove all reports and commands."""
@@ -112,9 +119,8 @@ class ShaftHistory:
 
     def shaft_at(self, stamp_s: float) -> Array:
         """Return the estimated shaft angles (3,) at `stamp_s`; the ends are held."""
-        reported, (before, _) = self.reported_at(stamp_s), self._shafts.bracket(stamp_s)
-        half_play = self.half_play_rad
-        return np.minimum(np.maximum(before.angles_rad, reported - half_play), reported + half_play)
+        before, _ = self._shafts.bracket(stamp_s)
+        return self._carried(before.angles_rad, self.reported_at(stamp_s))
 
     def reported_at(self, stamp_s: float) -> Array:
         """Return the angles (3,) at `stamp_s` as they would have been reported then; the ends are held."""
