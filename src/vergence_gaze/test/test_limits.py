@@ -60,6 +60,17 @@ def test_vergence_limit_on_the_way(limits: CommandLimits) -> None:
         assert limits.allows(limits.limited(np.array(wanted), last, 0.05, last))
 
 
+@pytest.mark.parametrize("way_rad", [0.5, -0.5])
+@pytest.mark.parametrize("speeds", [(1.0, 1.03), (1.03, 1.0)])
+def test_parallel_eyes_turn_although_one_pan_is_faster(way_rad: float, speeds: tuple[float, float]) -> None:
+    limits = CommandLimits(RIG.with_servos(IDEAL))
+    sent = np.array([0.0, limits.minimum_vergence_rad, 0.0])
+    for _ in range(100):
+        sent = limits.limited(np.array([way_rad, way_rad + 0.02, 0.0]), sent, 0.02, sent, np.array([*speeds, 1.0]))
+        assert limits.allows(sent)
+    np.testing.assert_allclose(sent, [way_rad, way_rad + 0.02, 0.0])
+
+
 def test_joints_that_are_not_numbers_stay(limits: CommandLimits) -> None:
     last = np.array([-0.1, 0.1, 0.2])
     np.testing.assert_array_equal(limits.limited(np.full(3, math.nan), last, 0.01, last), last)

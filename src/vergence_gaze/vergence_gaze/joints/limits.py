@@ -74,10 +74,12 @@ class CommandLimits:
         desired = self.nearest(np.where(np.isfinite(desired_rad), desired_rad, last_rad))
         reach = (self.speed_rad_s if speed_rad_s is None else speed_rad_s) * min(elapsed_s, LONGEST_STEP_S)
         move = np.minimum(np.maximum(desired - last_rad, -reach), reach)
-        # The pans may arrive one after the other; a common fraction of the move keeps to the vergence limit on the way.
-        room = last_rad[1] - last_rad[0] - self.minimum_vergence_rad
-        closing = move[0] - move[1]
-        if closing > room:
-            move[:2] *= max(room, 0.0) / closing
+        # The pans may arrive one after the other: the one that lessens the vergence waits for the other at the limit.
+        excess = move[0] - move[1] - (last_rad[1] - last_rad[0] - self.minimum_vergence_rad)
+        lessening = max(move[0], 0.0) + max(-move[1], 0.0)
+        if excess > 0 and lessening > 0:
+            share = max(lessening - excess, 0.0) / lessening
+            move[0] *= share if move[0] > 0 else 1.0
+            move[1] *= share if move[1] < 0 else 1.0
         limited: Array = np.minimum(np.maximum(last_rad + move, self.lower_rad), self.upper_rad)
         return limited
