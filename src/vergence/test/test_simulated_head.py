@@ -38,6 +38,7 @@ def test_photographs_are_looked_at(tmp_path) -> None:
         cv2.imwrite(str(tmp_path / f"{name}.png"), image[..., ::-1])
     with Head.photographs(tmp_path / "left.png", tmp_path / "right.png") as head:
         outcome = head.look_at(pixel=(240, 160)).wait()
+        head.run(0.3)  # until a pair shows the eyes as they rest
         found = head.measure()
     assert outcome.result is Result.VERGED, outcome
     assert found.verged

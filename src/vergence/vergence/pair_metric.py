@@ -176,7 +176,7 @@ class PairMetric:
         eyes = self.eyes_at(pair)
         samples = [
             (stamp_ns * 1e-9, angles)
-            for stamp_ns, angles in self._joints.samples_between(now_ns - _JOINT_SAMPLES_NS, now_ns)
+            for stamp_ns, angles in self._joints.samples_between(now_ns - _JOINT_SAMPLES_NS, max(now_ns, right_ns))
         ]
         why = "" if eyes is not None else self._joints.gap(max(now_ns, right_ns))
         return self._measurement.track(edge, now_ns * 1e-9, eyes, camera, samples, why)

@@ -146,3 +146,19 @@ def test_corners_that_are_lost_or_have_slid_are_put_right_by_what_the_point_look
     assert track.status is TrackStatus.OK, track.reason
     assert abs(stage.errors[-1][0] - (0.0 if is_put_right else off_px)) < 1.0
     assert abs(stage.errors[-1][1]) < 1.0
+
+
+def test_a_point_that_has_left_its_surroundings_is_not_taken_to_be_where_they_are(monkeypatch):
+    cv2.setRNGSeed(1)
+    stage = Stage("corner_cluster")
+    stage.show(PLACE, gaze(PLACE))
+    ask(stage, gaze(PLACE))
+    for k in range(11):
+        place = PLACE + np.array([0.0, 0.004 * k, 0.0])
+        assert stage.show(place, gaze(PLACE)).status is TrackStatus.OK
+    with monkeypatch.context() as without_corners:
+        without_corners.setattr(CornerCluster, "locate", lambda *_: "no corner is seen")
+        assert stage.show(place, gaze(PLACE)).status is TrackStatus.LOST
+    track = stage.show(place, gaze(PLACE))
+    assert track.status is TrackStatus.OK, track.reason
+    assert np.abs(stage.errors[-1][:2]).max() < 1.5

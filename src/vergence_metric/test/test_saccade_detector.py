@@ -60,6 +60,16 @@ def test_a_small_saccade_in_a_long_gap_shows_in_the_samples_between(sampled, jum
     assert not detector.update(1.3, after, meanwhile).jumped
 
 
+@pytest.mark.parametrize(("follows_deg", "saccade"), [(None, False), (2.4, False), (2.6, True)])
+def test_a_jump_that_follows_a_frame_may_have_begun_before_it(follows_deg, saccade):
+    detector, ahead = SaccadeDetector(TrackerParameters()), EyeAngles(0.0, 0.0, 0.0)
+    detector.update(1.0, ahead)
+    follows = [] if follows_deg is None else [(1.045, EyeAngles(0.0, math.radians(follows_deg), 0.0))]
+    state = detector.update(1.0 + FRAME_S, ahead, [(1.025, ahead), *follows])
+    assert (state.saccading, state.jumped) == (saccade, saccade)
+    assert not detector.update(1.0 + 2 * FRAME_S, ahead).saccading
+
+
 @pytest.mark.parametrize("turned", [(0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)])
 def test_any_joint_makes_a_saccade(turned):
     detector = SaccadeDetector(TrackerParameters())

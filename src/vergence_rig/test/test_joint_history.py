@@ -66,9 +66,9 @@ def test_the_past_is_forgotten_after_a_while() -> None:
     assert history.at(2500 * MS, 2500 * MS) is not None
 
 
-def test_the_states_between_two_stamps_are_given_in_order() -> None:
-    between = turning().samples_between(30 * MS, 60 * MS)
-    assert [stamp_ns for stamp_ns, _ in between] == [40 * MS, 50 * MS]
+def test_the_states_between_two_stamps_are_given_in_order_and_the_one_that_follows() -> None:
+    between = turning().samples_between(30 * MS, 55 * MS)
+    assert [stamp_ns for stamp_ns, _ in between] == [40 * MS, 50 * MS, 60 * MS]
     assert between[0][1] == EyeAngles(0.04, -0.08, 0.02)
     assert JointHistory().samples_between(0, 100 * MS) == []
 

@@ -100,9 +100,9 @@ class JointHistory:
         return f"no joint_states at the image's stamp: the newest is {(stamp - stamps[-1]) / units_per_s:.2f} s older"
 
     def samples_between(self, begin: float, end: float) -> list[tuple[float, EyeAngles]]:
-        """Return the states after `begin` and before `end`, with their stamps, in order."""
+        """Return the states after `begin`, up to the first that is not before `end`, with their stamps, in order."""
         stamps, samples = self._kept
-        first, last = bisect_right(stamps, begin), bisect_left(stamps, end)
+        first, last = bisect_right(stamps, begin), bisect_left(stamps, end) + 1
         chosen = zip(stamps[first:last], samples[first:last], strict=True)
         return [(stamp, EyeAngles(*(float(angle) for angle in sample.angles_rad))) for stamp, sample in chosen]
 

@@ -173,13 +173,13 @@ class EdgeMetricNode(MetricNode):
     def _publish_track(self, pair: ImagePair, edge: EdgeMetricResult, ideal: IdealPair) -> None:
         models = ideal.cameras
         with self._times.measure("tracker"):
-            now_ns = pair.left_stamp_ns
+            now_ns, last_ns = pair.left_stamp_ns, max(pair.left_stamp_ns, pair.right_stamp_ns)
             eyes = self._joints.at(now_ns, pair.right_stamp_ns)
             samples = [
                 (stamp_ns * 1e-9, angles)
-                for stamp_ns, angles in self._joints.samples_between(now_ns - _JOINT_SAMPLES_NS, now_ns)
+                for stamp_ns, angles in self._joints.samples_between(now_ns - _JOINT_SAMPLES_NS, last_ns)
             ]
-            why = "" if eyes is not None else self._joints.gap(max(now_ns, pair.right_stamp_ns))
+            why = "" if eyes is not None else self._joints.gap(last_ns)
             track = self._measurement.track(edge, now_ns * 1e-9, eyes, models and models[0], samples, why)
         angular = models and angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
         skew_s = pair.skew_ns * 1e-9

@@ -3,7 +3,8 @@
 Corners say how a target moves and turns, and where it is while a part of it is covered. What surrounded its point
 (`remembered_patch.py`) says where the eyes have turned to although the joints report it wrongly, and that corners have
 slid along a texture that repeats. So the corners lead. Where they are lost, or the point is seen elsewhere and looks
-there at least as much like itself, they are learnt anew.
+there at least as much like itself, they are learnt anew. What has moved away or turned has left its surroundings: where
+these are it no longer looks like itself.
 """
 
 from vergence_metric.tracking.corner_cluster import CornerCluster
@@ -16,6 +17,7 @@ from vergence_metric.tracking.remembered_patch import NEVER, PatchSighting, Reme
 from vergence_metric.tracking.request import StoredPair
 from vergence_metric.tracking.saccade_detector import EyeMotion
 
+_ALONE = 2.0  # no correlation is above it
 _APART_PX = 4.0  # places closer than this are one: that of the corners is the more accurate
 
 
@@ -38,36 +40,25 @@ class AnchoredCluster:
         p, fix = self._parameters, self._cluster.locate(pair, hidden_s, motion)
         if isinstance(fix, str):
             reach_px = min(p.request_search_px + p.search_growth_px_s * hidden_s, p.request_search_max_px)
-            seen = self._seen(pair, reach_px, p.request_similarity)
+            # Beside surroundings that it has left, the point itself may be unmistakable.
+            seen = self._seen(pair, reach_px, p.request_similarity) or self._seen(pair, reach_px, _ALONE)
             if seen is None:
                 return fix
             fix = self._cluster.relock(pair, seen.pixel, motion)
         else:
             seen = self._seen(pair, p.search_px, NEVER)
-            if seen is not None and self._is_elsewhere(seen, fix.left_px, pair):
-                fix = self._cluster.relock(pair, seen.pixel, motion)
+            if seen is not None and distance(seen.pixel, fix.left_px) > _APART_PX:
+                here, _ = self._patch.refine(pair.left, pair.views[0], fix.left_px, 1)
+                if seen.at_point >= here.at_point:
+                    fix = self._cluster.relock(pair, seen.pixel, motion)
         self._direction = pair.views[0].direction(fix.left_px)
         return fix
 
     def _seen(self, pair: StoredPair, reach_px: float, alone_below: float) -> PatchSighting | None:
-        """Return where the point is by its surroundings, None where these are not seen."""
+        """Return where the point is, None where its surroundings are not seen, or it is not in them."""
+        p = self._parameters
         seen = self._patch.find(pair.left, pair.views[0], self._direction, round(reach_px), alone_below)
-        if (
-            seen is None
-            or seen.similarity < self._parameters.request_similarity
-            or not is_inside(seen.pixel, pair.left)
-        ):
+        if seen is None or seen.similarity < p.request_similarity or not is_inside(seen.pixel, pair.left):
             return None
         self._most_at_point = max(self._most_at_point, seen.at_point)
-        return seen
-
-    def _is_elsewhere(self, seen: PatchSighting, corners_px: Pixel, pair: StoredPair) -> bool:
-        """Return whether the point is where it was seen, and not where the corners put it.
-
-        What has moved away or turned has left its surroundings: there it no longer looks like itself.
-        """
-        if distance(seen.pixel, corners_px) <= _APART_PX:
-            return False
-        least = self._most_at_point - (1.0 - self._parameters.anchor_similarity)
-        here, _ = self._patch.refine(pair.left, pair.views[0], corners_px, 1)
-        return seen.at_point >= max(least, here.at_point)
+        return seen if seen.at_point >= self._most_at_point - (1.0 - p.anchor_similarity) else None

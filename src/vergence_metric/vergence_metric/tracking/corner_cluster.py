@@ -29,7 +29,7 @@ from vergence_metric.tracking.segmentation import Region
 from vergence_metric.tracking.target_depth import TargetDepth
 
 _WINDOW_PX = 128  # the foveal window's side, at most
-_MOST = 60
+_MOST, _MOST_FOUND = 60, 120  # corners of a target, and in a window of its size
 _APART_PX = 5.0
 _ALIKE_RIGHT = 0.7  # least correlation of a corner in the other eye, whose view differs more
 _SIGMA_PX = 0.5
@@ -86,6 +86,7 @@ class CornerCluster:
             AffineCamera(np.array([[1.0, 0.0, -relief], [0.0, 1.0, 0.0]]), right_px),
         )
         self._sigma_rad = _SIGMA_PX / pair.views[0].camera.fx_px
+        self._eye_sigma_rad = 0.0  # of the reported angles of the left eye in the last pair
         self._point = DirectionFilter(pair.views[0].angles(np.array([point])), self._sigma_rad)
         self.corners = self._no_corners()
         found = find_corners(pair.left, point, self._half_px, _MOST, _APART_PX)
@@ -114,8 +115,11 @@ class CornerCluster:
         for camera, then, now in zip(self._cameras, before, pair.views, strict=True):
             camera.turn(now.stretch(then, camera.origin_px))
         reach_px = self._reach_px(turned_px, hidden, hidden_s, motion)
+        self._eye_sigma_rad = _TURNED_SHARE * turned_px / left_view.camera.fx_px
         window_px = round(self._half_px + reach_px)
-        found = find_corners(pair.left, (expected[0], expected[1]), window_px, 2 * _MOST, _APART_PX - 2.0)
+        # What is around the target has corners too, and the more the farther it is searched.
+        most = min(round(_MOST_FOUND * (window_px / self._half_px) ** 2), 3 * _MOST_FOUND)
+        found = find_corners(pair.left, (expected[0], expected[1]), window_px, most, _APART_PX - 2.0)
         if not len(found):
             return "there are no corners where it is predicted"
         matched = match_corners(pair.left, left_view, found, self.corners, self._cameras[0], expected, reach_px, hidden)
@@ -172,7 +176,7 @@ class CornerCluster:
         """Fit the left camera; return which of the matched corners agree with it (M,), or why they do not suffice."""
         corners, camera, before = self.corners, self._cameras[0], self._cameras[0].copy()
         established = corners.established
-        counting, total = established[matched.known], int(established.sum())
+        counting, total = established[matched.known], int(corners.expected.sum())
         structure = corners.structure.points[matched.known]
         depths = corners.structure.depth_variance[matched.known]
         # What is found elsewhere than expected may be another thing, of which a part looks like a part of the target.
@@ -231,11 +235,11 @@ class CornerCluster:
         if hidden:
             self._point.restart(np.array([0]), left_view.angles(origin[None]), np.zeros(2))
         else:
-            self._point.update(np.array([0]), left_view.angles(origin[None]))
+            self._point.update(np.array([0]), left_view.angles(origin[None]), self._eye_sigma_rad)
         self._last_left_y = float(origin[1])
         angles = left_view.angles(matched.px)
         again = corners.misses[matched.known] > 0
-        corners.filters.update(matched.known, angles)
+        corners.filters.update(matched.known, angles, self._eye_sigma_rad)
         corners.filters.restart(matched.known[again], angles[again], self._point.rates[0])
         corners.update(matched.known, matched.px, matched.patches, agree)
         corners.structure.observe(matched.known[agree], self._cameras[0], matched.px[agree])

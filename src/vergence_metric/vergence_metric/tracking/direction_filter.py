@@ -52,10 +52,11 @@ class DirectionFilter:
         """Standard deviations (N,) of the innovations [rad]."""
         return np.asarray(np.sqrt(self.covariance[:, 0, 0] + self._sigma_rad**2))
 
-    def update(self, which: NDArray[np.intp], angles: Points) -> None:
-        """Update the states `which` (M,) by measurements (M, 2)."""
+    def update(self, which: NDArray[np.intp], angles: Points, eye_sigma_rad: float = 0.0) -> None:
+        """Update the states `which` (M,) by measurements (M, 2) of an eye whose reported angle is that uncertain."""
         covariance = self.covariance[which]
-        gain = covariance[:, :, 0] / (covariance[:, 0, 0] + self._sigma_rad**2)[:, None]
+        noise = self._sigma_rad**2 + eye_sigma_rad**2
+        gain = covariance[:, :, 0] / (covariance[:, 0, 0] + noise)[:, None]
         innovation = angles - self.angles[which]
         self.angles[which] += gain[:, :1] * innovation
         self.rates[which] += gain[:, 1:] * innovation

@@ -15,6 +15,7 @@ Counts = NDArray[np.int_]
 _MISSES = 3  # pairs without it after which a corner that was never established is dropped
 _DISAGREEMENTS = 3  # pairs in a row in which it moves otherwise than the structure
 _ESTABLISHED = 5  # pairs in which a corner that is added later must agree before it counts
+_LATE = 10  # pairs without it after which a corner is no longer expected: it has turned away, or is covered
 _MOST = 120
 
 
@@ -72,6 +73,11 @@ class KnownCorners:
     def established(self) -> NDArray[np.bool_]:
         """Which have agreed with the structure for long enough to count (N,)."""
         return self._records.agreed >= _ESTABLISHED
+
+    @property
+    def expected(self) -> NDArray[np.bool_]:
+        """Which of those that count were seen of late, and so are expected when the target is seen again (N,)."""
+        return self.established & (self._records.misses < _LATE)
 
     @property
     def visible(self) -> NDArray[np.bool_]:

@@ -40,14 +40,21 @@ class SaccadeDetector:
     def update(self, stamp_s: float, eyes: EyeAngles, samples: Iterable[StampedEyeAngles] = ()) -> EyeMotion:
         """Return the motion of the eyes at a frame; stamps must increase.
 
-        `samples` are joint angles since the frame before; others are ignored. Without them a saccade between two frames
-        that are far apart can be missed.
+        `samples` are joint angles since the frame before, and those that follow this one as far as they are known.
+        Without the former a saccade between two frames that are far apart can be missed. Of the latter a jump says that
+        the eyes may have been anywhere between: angles at the frame lie on a straight line between two samples.
         """
         jumped = False
+        later: list[StampedEyeAngles] = []
         for sample_s, angles in samples:
-            if self._history and self._history[-1][0] < sample_s < stamp_s:
+            if sample_s >= stamp_s:
+                later.append((sample_s, angles))
+            elif self._history and self._history[-1][0] < sample_s:
                 jumped |= self._turns_fast(sample_s, angles)
+                self._history.append((sample_s, angles))
         saccading = self._turns_fast(stamp_s, eyes)
+        self._history.append((stamp_s, eyes))
+        saccading |= any(self._turns_fast(sample_s, angles) for sample_s, angles in later)
         if self._frame is None:
             self._rest_since_s = stamp_s
         else:
@@ -61,17 +68,16 @@ class SaccadeDetector:
         return EyeMotion(saccading, saccading or jumped, rested)
 
     def _turns_fast(self, stamp_s: float, eyes: EyeAngles) -> bool:
+        """Return whether the eyes have turned fast until a stamp that is later than the history."""
         p = self._parameters
         # The newest sample stays, however old. A margin of 1 ms: frames 33 ms apart are compared over all of 67 ms.
         while len(self._history) > 1 and self._history[0][0] < stamp_s - p.saccade_s - 1e-3:
             self._history.popleft()
         # Before a late frame the speed of the eyes is unknown: up to twice saccade_s the threshold stays the same.
-        fast = any(
+        return any(
             _rotation_rad(before, eyes) > p.saccade_rad * max(0.5 * (stamp_s - s) / p.saccade_s, 1.0)
             for s, before in self._history
         )
-        self._history.append((stamp_s, eyes))
-        return fast
 
 
 def _rotation_rad(before: EyeAngles, now: EyeAngles) -> float:
