@@ -11,7 +11,7 @@ from vergence_rig.parameters import Parameters, parameter
 class TrackerParameters(Parameters):
     """When the tracker locks, how it follows its target, and when it gives up."""
 
-    kind: str = parameter("corner_cluster", "which tracker follows the target", choices=tracker_names)
+    kind: str = parameter("remembered_patch", "which tracker follows the target", choices=tracker_names)
     saccade_rad: float = parameter(
         math.radians(2.5),
         "a rotation of an eye by more than this within tracker.saccade_s is a saccade",
