@@ -1,4 +1,4 @@
-"""`python -m bench.budget_empty_node metric|controller|servo`: an rclpy node with a node's subscriptions, no more."""
+"""`python -m bench.budget_empty_node KIND`: an rclpy node with a node's subscriptions, or a reader's, and no more."""
 
 import sys
 
@@ -26,6 +26,8 @@ TOPICS = {
         *((CameraInfo, f"{eye}/camera_info", 1) for eye in _EYES),
     ],
     "servo": [(JointState, "joint_command", 10)],
+    "box_reader": [(BoxVergence, "vergence/box", 10)],
+    "eye_rotation_reader": [(EyeRotation, "vergence/eye_rotation", 10)],
 }
 
 
