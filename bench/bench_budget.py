@@ -1,8 +1,8 @@
 """Each node's share of a core and memory: JPEG recordings of photographs at 640x480, 30 Hz, to fake servos.
 
 Every node is measured in the graph with the nodes that feed it, as a process of its own. Beside it stands an empty
-rclpy node with the same subscriptions: what rclpy and the middleware cost without any of our code. A metric node without
-subscribers measures nothing, so that each has one: in the loop the controller, else an empty node.
+rclpy node with the same subscriptions: what rclpy and the middleware cost without any of our code. A metric node
+without subscribers measures nothing, so that each has one: in the loop the controller, else an empty node.
 """
 
 import tempfile
