@@ -10,7 +10,7 @@ class TwoRates:
     """A timer of a node with two periods, the short one at first; it calls once at each moment of its clock.
 
     rclpy's events executor may call a due timer twice, which then leaves out its next period. In simulated time, which
-    stands still meanwhile, the second call is told by the clock.
+    stands still meanwhile, a second call has the stamp of the first.
     """
 
     def __init__(

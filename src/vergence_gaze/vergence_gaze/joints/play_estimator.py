@@ -78,10 +78,9 @@ class PlayEstimator:
         # A target that sets off is taken for lost motion once, before it is known to move.
         self._most_rad = np.maximum(_MOST_TIMES * described_half_play_rad, _LEAST_LIMIT_RAD)
         self.learning_share = learning_share
-        self._joints = [_Joint() for _ in range(3)]
         self._reports: deque[tuple[float, Array]] = deque()
-        self._reported_rad: Array | None = None
         self._target_rests = True
+        self.forget_way()
 
     def restart(self) -> None:
         """Drop the last observation: the next one is of another target."""
@@ -93,7 +92,7 @@ class PlayEstimator:
         """Forget where the joints have been: the clock was set, or they were turned by something else."""
         self._joints = [_Joint() for _ in range(3)]
         self._reports.clear()
-        self._reported_rad = None
+        self._reported_rad: Array | None = None
 
     def follow(self, stamp_s: float, reported_rad: Array) -> None:
         """Note the next reported angles (3,). They count once an image that was exposed later is seen, or cannot be."""
