@@ -35,7 +35,7 @@ class SteppedGraph:
                 "clock.real_time_factor": 0.0,
                 "clock.timeout_s": 60.0,
                 "head.model": "ideal",
-                "servo": "ideal",
+                "servo": "rig",
                 "target.y_m": 0.1,
             },
         )
