@@ -138,22 +138,24 @@ def test_a_slow_network_holds_up_neither_the_camera_nor_the_readers_beside_it(
     """The stream has 11 Mbit/s, the cable takes 1: at 0.4 s a frame, a camera that waits for it shows."""
     if shutil.which("tc") is None:
         pytest.skip("a slow network needs the tc command")
-    try:
-        cable.throttle("1mbit")
-    except OSError as error:
-        pytest.skip(f"this machine gives no slow network: {error}")
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
     laptop, pi = (("ip", "netns", "exec", namespace) for namespace in (cable.laptop, cable.pi))
     beside = processes.reader(*laptop)
     processes.camera(recording, *laptop)
     before_s = beside.next_s(30)
     far = processes.reader(*pi)
-    far_s = far.next_s(2)
+    far.next_s(2)  # through a cable that is slow already, the frames would leave no room for what finds the reader
+    try:
+        cable.throttle("1mbit")
+    except OSError as error:
+        pytest.skip(f"this machine gives no slow network: {error}")
+    far_s = far.next_s()
+    while np.diff(far_s[-2:]).max(initial=0.0) <= 3.0 / RATE_HZ:  # what was on its way before the cable was slow
+        far_s += far.next_s()
     beside_s = [0.0]
-    while beside_s[-1] < far_s[-1]:  # what came before the far one was there
+    while beside_s[-1] < far_s[-1]:
         beside_s += beside.next_s()
     beside_s = beside.next_s(60)
     far_s += far.next_s(3)
     assert period_s(beside_s) < WAITING_S + 3.0 * period_s(before_s)
     assert all(np.diff(far_s) > 0.0)
-    assert max(np.diff(far_s)) > 3.0 / RATE_HZ, "the cable was not slow"
