@@ -113,7 +113,7 @@ def _distance_errors(frames: list[Frame], regions: list[MovingRegion | None]) ->
         if region is None:
             continue
         # What the joints do not know of themselves is another row's matter: here their angles are the true ones.
-        points = region_points(region, stored(replace(frame, eyes=frame.true_eyes), camera), kinematics)
+        points = region_points(region, stored(replace(frame, eyes=frame.true_eyes), camera, kinematics), kinematics)
         if not isinstance(points, str):
             true_m = float(np.linalg.norm(frame.point_m))
             off.append(abs(float(np.linalg.norm(points.center_m)) - true_m) / true_m)

@@ -15,7 +15,7 @@ from vergence_metric.disparity import make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.shared_estimate import SharedEstimate
 from vergence_metric.tracking.anchored_cluster import AnchoredCluster
-from vergence_metric.tracking.eye_view import EyeView
+from vergence_metric.tracking.eye_view import eye_views
 from vergence_metric.tracking.locking_tracker import LockingTracker
 from vergence_metric.tracking.modelled_follower import Followed, TargetModel
 from vergence_metric.tracking.parameters import TrackerParameters
@@ -54,7 +54,7 @@ def run_tracker(kind: str, frames: list[Frame], rig: Rig, on_pair: OnPair | None
     for number, frame in enumerate(frames):
         started = time.thread_time()
         if number == REQUEST_FRAME:
-            tracker.request(TrackRequest(1, frame.stamp_s, True, frame.left_px), stored(frame, camera))
+            tracker.request(TrackRequest(1, frame.stamp_s, True, frame.left_px), stored(frame, camera, Kinematics(rig)))
         track = tracker.update(frame.left, frame.right, frame.stamp_s, frame.eyes)
         if number > REQUEST_FRAME:
             spent_s.append(time.thread_time() - started)
@@ -92,11 +92,9 @@ def model_of(tracker: Tracker) -> TargetModel | None:
     return Followed.model_of(tracker.target) if isinstance(tracker, LockingTracker) else None
 
 
-def stored(frame: Frame, camera: CameraModel) -> StoredPair:
+def stored(frame: Frame, camera: CameraModel, kinematics: Kinematics) -> StoredPair:
     """Return a frame as the pair in which a point is requested."""
-    pans = (frame.eyes.pan_left_rad, frame.eyes.pan_right_rad)
-    left, right = (EyeView(camera, pan_rad, frame.eyes.tilt_rad) for pan_rad in pans)
-    return StoredPair(frame.stamp_s, frame.left, frame.right, (left, right))
+    return StoredPair(frame.stamp_s, frame.left, frame.right, eye_views(camera, frame.eyes, kinematics))
 
 
 class _NaiveFixations:

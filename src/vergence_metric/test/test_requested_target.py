@@ -12,7 +12,7 @@ from vergence_metric.alignment.alignment import Alignment
 from vergence_metric.disparity import make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.tracking.appearance_follower import remembered_patch_tracker
-from vergence_metric.tracking.eye_view import EyeView
+from vergence_metric.tracking.eye_view import EyeView, eye_views
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_metric.tracking.request import PairMemory, StoredPair, TrackRequest
@@ -68,7 +68,7 @@ def view(left, eyes, board_m=BOARD_M, gain=1.0):
 
 
 def views(eyes):
-    return EyeView(CAMERA, eyes.pan_left_rad, eyes.tilt_rad), EyeView(CAMERA, eyes.pan_right_rad, eyes.tilt_rad)
+    return eye_views(CAMERA, eyes, Kinematics(RIG))
 
 
 AHEAD = EyeAngles(0.0, 0.0, 0.0)

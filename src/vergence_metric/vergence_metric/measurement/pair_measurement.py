@@ -14,7 +14,7 @@ from vergence_metric.disparity.shared_estimate import SharedEstimate
 from vergence_metric.measurement.edge_metric import AlignedPair, EdgeMetric, EdgeMetricResult
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
-from vergence_metric.tracking.eye_view import EyeView
+from vergence_metric.tracking.eye_view import EyeView, eye_views
 from vergence_metric.tracking.motion.awaited_motion import AwaitedMotion
 from vergence_metric.tracking.protocol import Tracker
 from vergence_metric.tracking.registry import make_tracker
@@ -116,7 +116,7 @@ class PairMeasurement:
         """Keep a pair for requests, and measure nothing in it; arguments as of `edge` and `track`."""
         pair, camera = self._metric.align(left, right), camera or self._rig_camera
         if eyes is not None and (camera.height_px, camera.width_px) == pair.left_grey.shape:
-            self._store(pair, stamp_s, self._views(camera, eyes))
+            self._store(pair, stamp_s, eye_views(camera, eyes, self._kinematics))
 
     def track(
         self,
@@ -147,7 +147,7 @@ class PairMeasurement:
             self._camera, self._ids_used = camera, self._newest_id
             self._tracker = make_tracker(self._parameters.tracker, self._estimator, camera, self._kinematics)
         self._pass_on_requests(self._tracker, edge, camera)
-        pair = self._store(edge, stamp_s, self._views(camera, eyes))
+        pair = self._store(edge, stamp_s, eye_views(camera, eyes, self._kinematics))
         if self._awaited_motion is not None:
             found = self._awaited_motion.update(pair)
             if isinstance(found, str):
@@ -158,13 +158,6 @@ class PairMeasurement:
         track = self._tracker.update(edge.left_grey, edge.right_grey, stamp_s, eyes, samples)
         self._newest_id = self._ids_used + track.track_id
         return replace(track, track_id=self._newest_id)
-
-    def _views(self, camera: CameraModel, eyes: EyeAngles) -> tuple[EyeView, EyeView]:
-        left, right = (
-            EyeView(camera, pan_rad, eyes.tilt_rad, self._kinematics.pitch_rad)
-            for pan_rad in (eyes.pan_left_rad, eyes.pan_right_rad)
-        )
-        return left, right
 
     def _store(
         self, pair: AlignedPair | EdgeMetricResult, stamp_s: float, views: tuple[EyeView, EyeView]
@@ -181,7 +174,7 @@ class PairMeasurement:
             return self._memory.nearest(request.stamp_s, _SAME_IMAGE_S)
         if abs(seen.stamp_s - request.stamp_s) > _SAME_IMAGE_S:
             return None
-        return StoredPair(seen.stamp_s, seen.left, by.apply(seen.right), self._views(camera, seen.eyes))
+        return StoredPair(seen.stamp_s, seen.left, by.apply(seen.right), eye_views(camera, seen.eyes, self._kinematics))
 
     def _pass_on_requests(self, tracker: Tracker, edge: EdgeMetricResult, camera: CameraModel) -> None:
         while self._requests:

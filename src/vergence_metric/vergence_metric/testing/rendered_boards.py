@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.disparity import make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
-from vergence_metric.tracking.eye_view import EyeView
+from vergence_metric.tracking.eye_view import eye_views
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.registry import make_tracker
 from vergence_metric.tracking.request import StoredPair
@@ -115,8 +115,8 @@ class Stage:
             image += 2.0 * cv2.randn(np.empty((480, 640), np.float32), 0, 1)
             images.append(np.asarray(np.clip(image, 0, 255), np.uint8))
         reported = joints or eyes
-        views = [EyeView(CAMERA, pan, reported.tilt_rad) for pan in (reported.pan_left_rad, reported.pan_right_rad)]
-        self.pair = StoredPair(self.frame * FRAME_S, images[0], images[1], (views[0], views[1]))
+        views = eye_views(CAMERA, reported, Kinematics(RIG))
+        self.pair = StoredPair(self.frame * FRAME_S, images[0], images[1], views)
         track = self.tracker.update(images[0], images[1], self.frame * FRAME_S, reported)
         true_left, true_right = true_pixel(target_m, True, eyes), true_pixel(target_m, False, eyes)
         self.tracks.append(track)

@@ -60,7 +60,7 @@ class AppearanceFollower:
         point, extent, disparity = self._segmenter.segment(left, right, fovea, disparity, views)
         appearance = TargetAppearance(left, point, extent or USUAL_EXTENT_PX)
         direction = views[0].direction(point)
-        target = Target(track_id, stamp_s, appearance, stamp_s, direction, np.zeros(3), extent is not None)
+        target = Target(track_id, stamp_s, appearance, stamp_s, views, direction, np.zeros(3), extent is not None)
         target.aside_px = offset_inside(fovea, point, extent)
         return target, self._visible(target, Sighting(point, 1.0, 0), disparity, pair)
 
@@ -68,6 +68,7 @@ class AppearanceFollower:
         """Return the track of a target in the next pair, or why it is given up."""
         p = self._parameters
         left, right, stamp_s, views = pair.left, pair.right, pair.stamp_s, pair.views
+        target.turn_to(views)
         hidden_s = stamp_s - target.seen_s if target.hidden else 0.0
         if hidden_s > p.give_up_s and target.patch is None:
             return f"target lost: not found for {hidden_s:.1f} s"
@@ -128,7 +129,9 @@ class AppearanceFollower:
             return None
         if not target.hidden:
             followed = target.appearance.follow(left, expected)
-            return without_drift(followed, target.patch, left, views[0], p) if target.patch else followed
+            if target.patch is None:
+                return followed
+            return without_drift(target, target.patch, followed, left, views[0], p)
         reach = round(p.search_px + p.search_growth_px_s * (stamp_s - target.seen_s))
         if distance(candidates[0], candidates[-1]) < reach:
             candidates = candidates[:1]

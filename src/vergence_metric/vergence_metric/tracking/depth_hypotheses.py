@@ -15,10 +15,11 @@ _LEAD = 2.0  # times the second weight
 
 @dataclass
 class Hypothesis:
-    """A parallax [rad] and the share of recent pairs that speak for it, 0 to 1."""
+    """A parallax [rad], the share of recent pairs that speak for it, 0 to 1, and the parallax at which it began."""
 
     parallax_rad: float
     weight: float
+    first_rad: float
 
 
 class DepthHypotheses:
@@ -64,7 +65,7 @@ class DepthHypotheses:
         for i, (parallax_rad, probability) in enumerate(candidates):
             mine = min(free, key=lambda one: abs(one.parallax_rad - parallax_rad), default=None)
             if mine is None or abs(mine.parallax_rad - parallax_rad) > self._apart_rad:
-                mine = Hypothesis(parallax_rad, 0.0)
+                mine = Hypothesis(parallax_rad, 0.0, parallax_rad)
                 self.ranked.append(mine)
             else:
                 free.remove(mine)

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_rig.camera import CameraModel
-from vergence_rig.geometry import rotation_rig_from_optical
+from vergence_rig.geometry import EyeAngles, rotation_rig_from_optical
+from vergence_rig.kinematics import Kinematics
 
 Pixel = tuple[float, float]
 Points = NDArray[np.float64]
@@ -18,13 +19,15 @@ Points = NDArray[np.float64]
 class EyeView:
     """One eye's camera at its angles; converts its pixels to directions in rig_base and back.
 
-    `pitch_rad` is that of the camera on its pan axis, > 0 down.
+    `pitch_rad` is that of the camera on its pan axis, > 0 down; `lens_m` is where the lens is in rig_base: one that
+    lies off the axes moves as the eye turns.
     """
 
     camera: CameraModel
     pan_rad: float
     tilt_rad: float
     pitch_rad: float = 0.0
+    lens_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def direction(self, pixel: Pixel) -> np.ndarray:
         """Return the unit direction (3,) in rig_base of a pixel."""
@@ -38,6 +41,13 @@ class EyeView:
         if not z > 0.0:
             return math.nan, math.nan
         return self.camera.distorted(x / z, y / z)
+
+    def direction_of(self, seen: np.ndarray, before: "EyeView", distance_m: float) -> np.ndarray:
+        """Return the unit direction (3,) of what an earlier view saw in direction `seen` (3,) at a distance [m]."""
+        if self.lens_m == before.lens_m or not math.isfinite(distance_m):
+            return seen
+        ray = np.asarray(seen) * distance_m + np.subtract(before.lens_m, self.lens_m)
+        return np.asarray(ray / np.linalg.norm(ray))
 
     def rays(self, pixels: NDArray[np.floating]) -> Points:
         """Return the unit directions (N, 3) in rig_base of pixels (N, 2)."""
@@ -66,6 +76,16 @@ class EyeView:
     @cached_property
     def _rig_from_optical(self) -> np.ndarray:
         return rotation_rig_from_optical(self.pan_rad, self.tilt_rad, self.pitch_rad)
+
+
+def eye_views(camera: CameraModel, eyes: EyeAngles, kinematics: Kinematics) -> tuple[EyeView, EyeView]:
+    """Return both eyes' views, each of ideal images of `camera`, with a head's eyes at these angles."""
+
+    def view(left: bool, pan_rad: float) -> EyeView:
+        x, y, z = kinematics.lens(left, pan_rad, eyes.tilt_rad).tolist()
+        return EyeView(camera, pan_rad, eyes.tilt_rad, kinematics.pitch_rad, (x, y, z))
+
+    return view(True, eyes.pan_left_rad), view(False, eyes.pan_right_rad)
 
 
 def distance(a: Pixel, b: Pixel) -> float:

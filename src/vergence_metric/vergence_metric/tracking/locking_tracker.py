@@ -12,7 +12,7 @@ from typing import Any
 
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.pairs.frame_motion import frame_motion_px
-from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
+from vergence_metric.tracking.eye_view import Pixel, distance, eye_views
 from vergence_metric.tracking.follower import Follower
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair, TrackRequest
@@ -33,7 +33,7 @@ class LockingTracker:
     ) -> None:
         self._follower = follower
         self._parameters = parameters
-        self._camera, self._pitch_rad = camera, kinematics.pitch_rad
+        self._camera, self._kinematics = camera, kinematics
         self._track_id = 0
         self.reset()
 
@@ -79,11 +79,7 @@ class LockingTracker:
         if stamp_s <= self._stamp_s:
             self.reset()
         motion = self._saccades.update(stamp_s, eyes, samples)
-        left_view, right_view = (
-            EyeView(self._camera, pan_rad, eyes.tilt_rad, self._pitch_rad)
-            for pan_rad in (eyes.pan_left_rad, eyes.pan_right_rad)
-        )
-        pair = StoredPair(stamp_s, left, right, (left_view, right_view))
+        pair = StoredPair(stamp_s, left, right, eye_views(self._camera, eyes, self._kinematics))
         before, self._before, self._stamp_s = self._before, left, stamp_s
         if self._target is not None and self._requested:
             return self._follow(self._target, pair, motion)

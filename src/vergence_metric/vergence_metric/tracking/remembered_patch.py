@@ -8,8 +8,10 @@ Along an edge or without texture, where a level looks the same everywhere, the p
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -18,11 +20,12 @@ from numpy.typing import NDArray
 from vergence_metric.disparity.correlation import peak_offset
 from vergence_metric.disparity.fovea_pair import cut
 from vergence_metric.disparity.protocol import Image
-from vergence_metric.tracking.eye_view import EyeView, Pixel
+from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
+from vergence_metric.tracking.reduced import reduced
 
 _WIDE_HALF_PX, _WIDE_SCALE = 160, 4
 _WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context is looked for
-_WIDE_REACH_PX = 16  # that parallax may move the point beside it
+_WIDE_REACH_PX = 8  # that parallax may move the point beside it
 _CONTEXT_HALF_PX, _CONTEXT_SCALE = 48, 2  # on photographs the smallest that rarely errs
 _POINT_HALF_PX = 16
 NEVER = -1.0
@@ -34,10 +37,24 @@ _REFINED_WITHIN_PX = 4
 _LEAST_CONTRAST = 1.0  # standard deviation of a template [grey levels]
 _AS_ALIKE = 0.2  # difference in evidence below which two places look alike
 _PRIOR, _WIDE_PRIOR, _POINT_PRIOR = 0.3, 4.0, 1.0  # evidence by which a place at the rim of its search is worse
+_SAME_PX = 2.0  # by which what is in front of or behind a surface may have moved against it, and still count
+_MOSTLY_OWN = 128  # of 255
+_LEAST_OWN_PX = 60
+_LARGEST_CORRELATION = 1.001  # a masked one is greater where nothing is seen
 _TAKEN = -99.0  # evidence where a place has been found already
 _NOISE = 0.002  # share of its variance that an image taken again does not explain
 
 Sides = tuple[int, int, int, int]
+Own = Callable[[int], "Image | None"]
+"""The mask (h, w) of a point's own surface at a scale; None where it is not known."""
+
+
+class Template(NamedTuple):
+    """What is looked for, (h, w) uint8, how far it reaches on each side [its px], and which of it counts, None: all."""
+
+    image: Image
+    mask: Image | None
+    sides: Sides
 
 
 @dataclass(frozen=True)
@@ -60,7 +77,7 @@ class RememberedPatch:
     def __init__(self, image: Image, view: EyeView, pixel: Pixel) -> None:
         self._view = view
         self.direction = view.direction(pixel)
-        self._levels = {scale: _reduced(image, scale) for scale in (1, _CONTEXT_SCALE, _WIDE_SCALE)}
+        self._levels = {scale: reduced(image, scale) for scale in (1, _CONTEXT_SCALE, _WIDE_SCALE)}
         self._reaches = _reaches(image, pixel)
 
     def find(
@@ -70,23 +87,29 @@ class RememberedPatch:
         direction: NDArray[np.float64],
         reach_px: int,
         alone_below: float = NEVER,
+        distance_m: float = math.inf,
+        own: Own | None = None,
     ) -> PatchSighting | None:
         """Return where it is, expected within `reach_px` of `direction` (3,) in rig_base; None outside the image.
 
         Where its surroundings are less similar than `alone_below`, the point itself counts if it is unmistakable.
+        `distance_m` is the point's: a lens off its axis has moved, and what is far away lies beside the point now.
+        Then only its own surface counts, as `own` returns its mask at a scale.
         """
         expected, height, width = view.pixel(direction), *image.shape
         if not (-reach_px <= expected[0] < width + reach_px and -reach_px <= expected[1] < height + reach_px):
             return None
-        expected, reach, prior, wide_spread_px = self._about(image, view, expected, reach_px)
+        far = self._far(view, direction, distance_m)
+        own = own if _is_displaced(expected, far) else None
+        expected, reach, prior, wide_spread_px = self._about(image, view, expected, far, reach_px)
         size = (_CONTEXT_HALF_PX, _CONTEXT_SCALE)
-        places, spread_px = self._places(image, view, expected, reach, size, _CANDIDATES, prior)
+        places, spread_px = self._places(image, view, expected, reach, size, _CANDIDATES, prior, own)
         if not places:
             return None
-        template, sides = self._template(image, view, expected, (_POINT_HALF_PX, 1))
+        template = self._template(image, view, expected, (_POINT_HALF_PX, 1), own)
         found = []
         for place, similarity in places:
-            pixel, at_point, _ = _best_near(image, template, sides, place, _REFINED_WITHIN_PX)
+            pixel, at_point, _ = _best_near(image, template, place, _REFINED_WITHIN_PX)
             off = math.hypot(place[0] - expected[0], place[1] - expected[1]) / reach
             evidence = float(_evidence(np.array([similarity, at_point], np.float32)).sum())
             found.append((evidence - prior * off**2, similarity, at_point, pixel))
@@ -94,41 +117,64 @@ class RememberedPatch:
         sighting = PatchSighting(pixel, similarity, at_point, min(spread_px, wide_spread_px))
         if similarity >= alone_below:
             return sighting
-        return self._alone(image, view, expected, reach, prior) or sighting
+        return self._alone(image, view, expected, reach, prior, own) or sighting
 
-    def _alone(self, image: Image, view: EyeView, expected: Pixel, reach: int, prior: float) -> PatchSighting | None:
+    def _alone(
+        self, image: Image, view: EyeView, expected: Pixel, reach: int, prior: float, own: Own | None
+    ) -> PatchSighting | None:
         """Return where the point itself is, whatever surrounds it now; None unless it is unmistakable.
 
         A lens that lies off the axes moves as the eye turns: what stands near has another background then.
         """
-        places, spread_px = self._places(image, view, expected, reach, (_POINT_HALF_PX, 1), 2, prior)
+        places, spread_px = self._places(image, view, expected, reach, (_POINT_HALF_PX, 1), 2, prior, own)
         best, second = [*(similarity for _, similarity in places), 0.0, 0.0][:2]
         if second > best - _ALONE_LEAD:
             return None
         return PatchSighting(places[0][0], best, best, spread_px)
 
-    def _about(self, image: Image, view: EyeView, expected: Pixel, reach_px: int) -> tuple[Pixel, int, float, float]:
-        """Return where to search the point, how far and at which prior, by the wide view; the last is its spread."""
+    def _about(
+        self, image: Image, view: EyeView, expected: Pixel, far: Pixel, reach_px: int
+    ) -> tuple[Pixel, int, float, float]:
+        """Return where to search the point, how far and at which prior, by the wide view; the last is its spread.
+
+        The wide view is expected at `far`: most of it is much farther away than a point that is looked at.
+        """
         reach = max(reach_px, _WIDE_REACH_PX)
         prior = _PRIOR * (reach / max(reach_px, 1)) ** 2
-        wide, spread_px = self._places(image, view, expected, reach, (_WIDE_HALF_PX, _WIDE_SCALE), 1, prior)
+        wide, spread_px = self._places(image, view, far, reach, (_WIDE_HALF_PX, _WIDE_SCALE), 1, prior)
         if wide and wide[0][1] >= _WIDE_SIMILARITY:
-            return wide[0][0], _WIDE_REACH_PX, _WIDE_PRIOR, spread_px
+            (x, y), _ = wide[0]
+            there = (x + expected[0] - far[0], y + expected[1] - far[1])
+            return there, _WIDE_REACH_PX, _WIDE_PRIOR, spread_px
         return expected, reach, prior, spread_px
 
-    def refine(self, image: Image, view: EyeView, pixel: Pixel, reach_px: int) -> tuple[PatchSighting, float]:
+    def refine(
+        self,
+        image: Image,
+        view: EyeView,
+        pixel: Pixel,
+        reach_px: int,
+        distance_m: float = math.inf,
+        own: Own | None = None,
+    ) -> tuple[PatchSighting, float]:
         """Return where the point itself is within `reach_px` of a pixel, and its similarity at that pixel.
 
-        Only its nearest surroundings count: those of a moving object change.
+        Only its nearest surroundings count: those of a moving object change. `distance_m` and `own` are as in `find`.
         """
-        template, sides = self._template(image, view, pixel, (_POINT_HALF_PX, 1))
-        place, similarity, here = _best_near(image, template, sides, pixel, reach_px)
+        far = self._far(view, view.direction(pixel), distance_m)
+        own = own if _is_displaced(pixel, far) else None
+        template = self._template(image, view, pixel, (_POINT_HALF_PX, 1), own)
+        place, similarity, here = _best_near(image, template, pixel, reach_px)
         return PatchSighting(place, similarity, similarity), here
 
-    def _template(self, image: Image, view: EyeView, at: Pixel, size: tuple[int, int]) -> tuple[Image, Sides]:
-        """Return what must be seen about a pixel now, as far as both images reach, and how far that is on each side.
+    def _far(self, view: EyeView, direction: NDArray[np.float64], distance_m: float) -> Pixel:
+        """Return where that is now which was far behind the point when the point was seen."""
+        return view.pixel(self._view.direction_of(direction, view, distance_m))
 
-        `size` is (half side [px], scale); the template and its sides are in pixels of the scale.
+    def _template(self, image: Image, view: EyeView, at: Pixel, size: tuple[int, int], own: Own | None) -> Template:
+        """Return what must be seen about a pixel now, as far as both images reach, at a size (half side [px], scale).
+
+        With `own` only the point's own surface counts.
         """
         half_px, scale = size
         now = _reaches(image, at)
@@ -149,7 +195,9 @@ class RememberedPatch:
             flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
             borderMode=cv2.BORDER_REPLICATE,
         )
-        return np.asarray(template), (left, top, right, bottom)
+        then_own = own(scale) if own is not None else None
+        mask = None if then_own is None else _turned(then_own, warp, template.shape)
+        return Template(np.asarray(template), mask, (left, top, right, bottom))
 
     def _places(
         self,
@@ -160,20 +208,22 @@ class RememberedPatch:
         size: tuple[int, int],
         most: int,
         prior: float,
+        own: Own | None = None,
     ) -> tuple[list[tuple[Pixel, float]], float]:
         """Return up to `most` places of the template of a size, the best first, with their correlation.
 
         The second value is how far from the best one the surface is as high [px].
         """
         scale, reach = size[1], -(-reach_px // size[1])
-        template, sides = self._template(image, view, expected, size)
-        if float(template.std()) < _LEAST_CONTRAST:
+        template = self._template(image, view, expected, size, own)
+        if float(template.image.std()) < _LEAST_CONTRAST:
             return [], float(reach_px)
         at = (round(expected[0]), round(expected[1]))
-        left, top, right, bottom = (scale * (side + reach) for side in sides)
+        left, top, right, bottom = (scale * (side + reach) for side in template.sides)
         area = cut(image, at[0] - left, at[1] - top, left + right + scale, top + bottom + scale)
-        surface = _correlation(_reduced(area, scale), template)
+        surface = _correlation(reduced(area, scale), template)
         evidence = _evidence(surface)
+        at_middle = float(surface[reach, reach])
         ranked = evidence - _cost(surface.shape, prior)
         j, i = divmod(int(ranked.argmax()), ranked.shape[1])
         rows, columns = np.nonzero(evidence >= evidence[j, i] - _AS_ALIKE)
@@ -189,6 +239,8 @@ class RememberedPatch:
             place = (at[0] + scale * (i + di) + middle_px, at[1] + scale * (j + dj) + middle_px)
             places.append((place, float(surface[j, i])))
             ranked[max(j - apart, 0) : j + apart + 1, max(i - apart, 0) : i + apart + 1] = _TAKEN
+        if most > 1 and at_middle > 0.0:
+            places.append((expected, at_middle))
         return places, spread_px
 
 
@@ -198,13 +250,17 @@ def _reaches(image: Image, pixel: Pixel) -> tuple[float, float, float, float]:
     return pixel[0], pixel[1], width - 1 - pixel[0], height - 1 - pixel[1]
 
 
-def _reduced(image: Image, scale: int) -> Image:
-    """Return the image with the mean of every `scale` by `scale` pixels as one."""
-    if scale == 1:
-        return image
-    height, width = image.shape
-    size = (width // scale, height // scale)
-    return np.asarray(cv2.resize(image[: size[1] * scale, : size[0] * scale], size, interpolation=cv2.INTER_AREA))
+def _is_displaced(at: Pixel, far: Pixel) -> bool:
+    """Return whether what lies far behind a point has moved against it."""
+    return distance(at, far) > _SAME_PX
+
+
+def _turned(mask: Image, warp: NDArray[np.float64], shape: tuple[int, ...]) -> Image | None:
+    """Return the part of a mask that a template (h, w) is of; None where too little of that counts."""
+    flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    turned = np.asarray(cv2.warpPerspective(mask, warp, shape[::-1], flags=flags))
+    counts = turned >= _MOSTLY_OWN
+    return np.where(counts, np.uint8(255), np.uint8(0)) if np.count_nonzero(counts) >= _LEAST_OWN_PX else None
 
 
 @lru_cache(maxsize=32)
@@ -216,14 +272,14 @@ def _cost(shape: tuple[int, ...], prior: float) -> NDArray[np.float32]:
     return cost
 
 
-def _best_near(image: Image, template: Image, sides: Sides, place: Pixel, reach: int) -> tuple[Pixel, float, float]:
+def _best_near(image: Image, template: Template, place: Pixel, reach: int) -> tuple[Pixel, float, float]:
     """Return the sub-pixel place within reach where the template fits best, its correlation, and that at `place`.
 
     Of places that fit alike the nearest counts.
     """
-    left, top, _, _ = sides
+    (left, top, _, _), (height, width) = template.sides, template.image.shape
     x0, y0 = round(place[0]) - left - reach, round(place[1]) - top - reach
-    area = cut(image, x0, y0, template.shape[1] + 2 * reach, template.shape[0] + 2 * reach)
+    area = cut(image, x0, y0, width + 2 * reach, height + 2 * reach)
     surface = _correlation(area, template)
     nearest = _evidence(surface) - _cost(surface.shape, _POINT_PRIOR)
     j, i = divmod(int(nearest.argmax()), surface.shape[1])
@@ -236,9 +292,10 @@ def _evidence(similarity: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(-np.log(1.0 + _NOISE - similarity), np.float32)
 
 
-def _correlation(area: Image, template: Image) -> NDArray[np.float32]:
-    surface = np.asarray(cv2.matchTemplate(area, template, cv2.TM_CCOEFF_NORMED), np.float32)
-    usable = np.isfinite(surface)
+def _correlation(area: Image, template: Template) -> NDArray[np.float32]:
+    how = cv2.TM_CCOEFF_NORMED
+    surface = np.asarray(cv2.matchTemplate(area, template.image, how, mask=template.mask), np.float32)
+    usable = np.isfinite(surface) & (np.abs(surface) <= _LARGEST_CORRELATION)
     if not usable.all():
         surface[~usable] = -1.0
     return surface

@@ -7,6 +7,7 @@ import numpy as np
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
 from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
+from vergence_metric.tracking.own_pixels import OwnSurface
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import NEVER, RememberedPatch
 from vergence_metric.tracking.request import StoredPair, TrackRequest
@@ -32,10 +33,17 @@ def requested_target(
     point = request.pixel if request.left_eye else pixel_in_left_eye(request.pixel, pair, estimator)
     patch = RememberedPatch(pair.left, pair.views[0], point)
     appearance = TargetAppearance(pair.left, point, request.extent_px or USUAL_EXTENT_PX)
-    target = Target(track_id, pair.stamp_s, appearance, pair.stamp_s, patch.direction, np.zeros(3), True)
+    target = Target(track_id, pair.stamp_s, appearance, pair.stamp_s, pair.views, patch.direction, np.zeros(3), True)
     target.patch, target.goal_id, target.hidden, target.found = patch, request.goal_id, True, False
     target.depths = DepthHypotheses(parameters.depth_memory, parameters.depth_apart_rad, parameters.depth_share)
-    weigh_depths(target, target.depths, estimator.estimate(pair.left, pair.right, point), point, pair.views)
+    disparity = estimator.estimate(pair.left, pair.right, point)
+    weigh_depths(target, target.depths, disparity, point, pair.views)
+    distances = [
+        (angle, px)
+        for angle, _ in parallax_shares(disparity, point, pair.views)
+        if (px := disparity_of_parallax(angle, point, pair.views)) is not None
+    ]
+    target.surface = OwnSurface(pair.left, pair.right, point, distances, parameters.depth_apart_rad)
     return target
 
 
@@ -120,7 +128,7 @@ def find_by_surroundings(
         reach_px = p.request_search_px + p.search_growth_px_s * (stamp_s - target.seen_s)
         reach_px = min(reach_px, p.request_search_max_px)
     alone_below = p.request_similarity if target.hidden else NEVER
-    found = patch.find(left, view, target.direction, round(reach_px), alone_below)
+    found = patch.find(left, view, target.direction, round(reach_px), alone_below, target.distance_m, target.own)
     if found is None:
         return None
     alike = found.similarity >= p.request_similarity
@@ -138,11 +146,16 @@ def find_by_surroundings(
 
 
 def without_drift(
-    followed: Sighting, patch: RememberedPatch, left: Image, view: EyeView, parameters: TrackerParameters
+    target: Target,
+    patch: RememberedPatch,
+    followed: Sighting,
+    left: Image,
+    view: EyeView,
+    parameters: TrackerParameters,
 ) -> Sighting:
     """Return the sighting put right where the point, as it was when it was requested, is clearly beside it."""
     p = parameters
-    anchor, here = patch.refine(left, view, followed.pixel, p.anchor_px)
+    anchor, here = patch.refine(left, view, followed.pixel, p.anchor_px, target.distance_m, target.own)
     # Along an edge, or without texture, other places look as much like it: only a clear gain is drift.
     if anchor.similarity < max(p.anchor_similarity, here + p.anchor_gain):
         return followed

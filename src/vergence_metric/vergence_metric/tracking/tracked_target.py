@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vergence_metric.disparity.protocol import Image
 from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel
+from vergence_metric.tracking.own_pixels import OwnSurface
 from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_metric.tracking.target_appearance import TargetAppearance
 
@@ -17,6 +19,7 @@ _COAST_HALF_LIFE_S = 0.7  # a hidden target's predicted velocity fades: it may h
 _COAST_FROM_S = 0.3  # a hidden target is predicted by its velocity over this time, not by its last two sightings
 _SLOPE_OVER_S = 0.06
 _SEGMENTED_EVERY = 32
+_LEAST_PARALLAX_RAD = 0.005  # below it a target counts as far away
 
 
 @dataclass
@@ -27,7 +30,8 @@ class Target:
     lock_stamp_s: float
     appearance: TargetAppearance
     seen_s: float
-    direction: np.ndarray  # unit vector in rig_base when last seen
+    views: tuple[EyeView, EyeView]  # the eyes' latest
+    direction: np.ndarray  # unit vector in rig_base from the left lens there, as last seen
     velocity: np.ndarray  # of that vector, per second
     bounded: bool  # its region was segmented
     aside_px: Pixel = (0.0, 0.0)  # from its region's centre to the fovea when locked on
@@ -36,12 +40,34 @@ class Target:
     matched_vergence_rad: float = math.nan  # of the eyes by their joints, when last matched in the right eye
     parallax_rad: float = math.nan  # angle from the left eye's ray to the right eye's, in the plane of the baseline
     patch: RememberedPatch | None = None  # of a requested target
+    surface: OwnSurface | None = None  # of a requested target
     depths: DepthHypotheses | None = None  # of a requested target
     found: bool = True  # since its request
     most_at_point: float = 0.0  # of a requested target: what noise leaves of the point's similarity with itself
     goal_id: int = 0
     sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # recent stamps and directions
     unbounded_pairs: int = 0  # in which it might have been segmented
+
+    @property
+    def distance_m(self) -> float:
+        """From the left lens, by the parallax; inf where that is not known."""
+        if not self.parallax_rad > _LEAST_PARALLAX_RAD:
+            return math.inf
+        baseline_m = self.views[0].lens_m[1] - self.views[1].lens_m[1]
+        return baseline_m * math.cos(_across(self.direction) + self.parallax_rad) / math.sin(self.parallax_rad)
+
+    def own(self, scale: int) -> Image | None:
+        """Return the mask (h, w) of its own surface where it was seen at its request; None where it is not known."""
+        if self.surface is None or self.depths is None:
+            return None
+        # Parallaxes change by what the joints report wrongly, and may seem new: what counts is with which they began.
+        masks = (self.surface.mask(one.first_rad, scale) for one in self.depths.ranked)
+        return next((mask for mask in masks if mask is not None), None)
+
+    def turn_to(self, views: tuple[EyeView, EyeView]) -> None:
+        """Give the direction from where the left lens is by now."""
+        self.direction = views[0].direction_of(self.direction, self.views[0], self.distance_m)
+        self.views = views
 
     def segmentation_due(self) -> bool:
         """Count a pair in which a target without bounds could be segmented; returns whether it is to be tried.
