@@ -25,7 +25,7 @@ from vergence_metric.tracking.reduced import reduced
 
 _WIDE_HALF_PX, _WIDE_SCALE = 160, 4
 _WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context is looked for
-_WIDE_REACH_PX = 8  # that parallax may move the point beside it
+_WIDE_REACH_PX = 16  # that parallax may move the point beside it
 _CONTEXT_HALF_PX, _CONTEXT_SCALE = 48, 2  # on photographs the smallest that rarely errs
 _POINT_HALF_PX = 16
 NEVER = -1.0
@@ -223,7 +223,6 @@ class RememberedPatch:
         area = cut(image, at[0] - left, at[1] - top, left + right + scale, top + bottom + scale)
         surface = _correlation(reduced(area, scale), template)
         evidence = _evidence(surface)
-        at_middle = float(surface[reach, reach])
         ranked = evidence - _cost(surface.shape, prior)
         j, i = divmod(int(ranked.argmax()), ranked.shape[1])
         rows, columns = np.nonzero(evidence >= evidence[j, i] - _AS_ALIKE)
@@ -239,8 +238,6 @@ class RememberedPatch:
             place = (at[0] + scale * (i + di) + middle_px, at[1] + scale * (j + dj) + middle_px)
             places.append((place, float(surface[j, i])))
             ranked[max(j - apart, 0) : j + apart + 1, max(i - apart, 0) : i + apart + 1] = _TAKEN
-        if most > 1 and at_middle > 0.0:
-            places.append((expected, at_middle))
         return places, spread_px
 
 
