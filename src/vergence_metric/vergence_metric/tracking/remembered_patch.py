@@ -167,7 +167,7 @@ class RememberedPatch:
         """
         scale, reach = size[1], -(-reach_px // size[1])
         template, sides = self._template(image, view, expected, size)
-        if float(template.std()) < _LEAST_CONTRAST:
+        if cv2.meanStdDev(template)[1][0, 0] < _LEAST_CONTRAST:
             return [], float(reach_px)
         at = (round(expected[0]), round(expected[1]))
         left, top, right, bottom = (scale * (side + reach) for side in sides)
