@@ -17,6 +17,8 @@ from vergence_sim.model_builder import HIDDEN_GROUP
 Image = npt.NDArray[np.uint8]
 
 _GL_RGBA, _GL_UNSIGNED_BYTE = 0x1908, 0x1401
+_GL_FRAMEBUFFER, _GL_RENDERBUFFER, _GL_DEPTH_COMPONENT32F = 0x8D40, 0x8D41, 0x8CAC
+_GL_DEPTH_ATTACHMENT, _GL_STENCIL_ATTACHMENT = 0x8D00, 0x8D20
 # Simulators share a model, whose shapes outside a view are hidden while that view's scene is made.
 _MODEL_LOCK = threading.Lock()
 
@@ -51,6 +53,8 @@ class EyeRenderer:
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
+        if not self._mjr.offSamples:
+            self._drop_stencil(width_px, height_px)
         self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZERONEAR
         self._viewports = {camera: mujoco.MjrRect(0, 0, *size) for camera, size in sizes_px.items()}
         self._views: dict[str, tuple[bytes, Image]] = {}
@@ -83,6 +87,15 @@ class EyeRenderer:
                 self._model, data, self._options, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
             )
             groups[:] = visible
+
+    def _drop_stencil(self, width_px: int, height_px: int) -> None:
+        """Give the frame a depth buffer alone: with a stencil, which only reflections need, it is twice as large."""
+        gl, buffer = self._gl, self._mjr.offDepthStencil
+        gl.glBindFramebuffer(_GL_FRAMEBUFFER, self._mjr.offFBO)
+        gl.glFramebufferRenderbuffer(_GL_FRAMEBUFFER, _GL_STENCIL_ATTACHMENT, _GL_RENDERBUFFER, 0)
+        gl.glBindRenderbuffer(_GL_RENDERBUFFER, buffer)
+        gl.glRenderbufferStorage(_GL_RENDERBUFFER, _GL_DEPTH_COMPONENT32F, width_px, height_px)
+        gl.glFramebufferRenderbuffer(_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_RENDERBUFFER, buffer)
 
     def _read(self, viewport: Any) -> Image:
         """Return the pixels just drawn (h, w, 3) BGR, rows upwards."""
