@@ -38,6 +38,8 @@ class EyeRenderer:
             self._context.make_current()
             self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
             self._gl = _opengl()
+            if not self._mjr.offSamples:
+                self._drop_stencil()
         except Exception as error:
             raise RenderError(
                 f"MuJoCo cannot render offscreen with MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}: {error}; install "
@@ -53,8 +55,6 @@ class EyeRenderer:
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
-        if not self._mjr.offSamples:
-            self._drop_stencil(width_px, height_px)
         self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZERONEAR
         self._viewports = {camera: mujoco.MjrRect(0, 0, *size) for camera, size in sizes_px.items()}
         self._views: dict[str, tuple[bytes, Image]] = {}
@@ -88,13 +88,13 @@ class EyeRenderer:
             )
             groups[:] = visible
 
-    def _drop_stencil(self, width_px: int, height_px: int) -> None:
+    def _drop_stencil(self) -> None:
         """Give the frame a depth buffer alone: with a stencil, which only reflections need, it is twice as large."""
-        gl, buffer = self._gl, self._mjr.offDepthStencil
+        gl, buffer, size_px = self._gl, self._mjr.offDepthStencil, (self._mjr.offWidth, self._mjr.offHeight)
         gl.glBindFramebuffer(_GL_FRAMEBUFFER, self._mjr.offFBO)
         gl.glFramebufferRenderbuffer(_GL_FRAMEBUFFER, _GL_STENCIL_ATTACHMENT, _GL_RENDERBUFFER, 0)
         gl.glBindRenderbuffer(_GL_RENDERBUFFER, buffer)
-        gl.glRenderbufferStorage(_GL_RENDERBUFFER, _GL_DEPTH_COMPONENT32F, width_px, height_px)
+        gl.glRenderbufferStorage(_GL_RENDERBUFFER, _GL_DEPTH_COMPONENT32F, *size_px)
         gl.glFramebufferRenderbuffer(_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_RENDERBUFFER, buffer)
 
     def _read(self, viewport: Any) -> Image:
