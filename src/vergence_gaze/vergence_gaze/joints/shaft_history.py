@@ -22,6 +22,7 @@ _KEEP_S = 3.0
 _HOLD_S = 0.2
 _CLOCK_JUMP_S = 1.0
 _MOST_COMMANDS = 1000
+_MOST_FOUND = 32  # angles kept where no report and no command comes that ends them
 _INSTANT_S = 1e-4
 _STILL = np.zeros(3)
 
@@ -123,7 +124,7 @@ class ShaftHistory:
 
     def shaft_at(self, stamp_s: float) -> Array:
         """Return the estimated shaft angles (3,) at `stamp_s`; the ends are held. They must not be changed."""
-        if self._found_with is not self.half_play_rad:
+        if self._found_with is not self.half_play_rad or len(self._found) > _MOST_FOUND:
             self._found_with = self.half_play_rad
             self._found.clear()
         found = self._found.get(stamp_s)
