@@ -14,6 +14,7 @@ import numpy as np
 from bench.cost_photographs import Glance, glances, models
 from bench.photos_data import NoPhotographsError
 from bench.results import Row
+from vergence_common.blas_threads import limit_blas_threads
 from vergence_common.memory import keep_large_blocks
 from vergence_metric.measurement.edge_metric import EdgeMetricResult
 from vergence_metric.measurement.pair_measurement import PairMeasurement
@@ -55,7 +56,8 @@ def run(say: Callable[[str], None]) -> list[Row]:
     except NoPhotographsError as error:
         say(f"skipped: {error}")
         return []
-    keep_large_blocks()  # as every node does
+    keep_large_blocks()  # as every node does, like the next
+    limit_blas_threads()
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     rows = []

@@ -232,8 +232,10 @@ class Rig:
 
     def eye_angle(self, name: str, joint_rad: float) -> float:
         """Return the angle of one joint's optical axis [rad], as `eye_angles`."""
-        yaws_rad = {"pan_left": self.left_mount.yaw_rad, "pan_right": self.right_mount.yaw_rad}
-        return self.joints[name].axis_rad(joint_rad) + yaws_rad.get(name, 0.0)
+        axis_rad = self.joints[name].axis_rad(joint_rad)
+        if name == "tilt":
+            return axis_rad
+        return axis_rad + (self.left_mount if name == "pan_left" else self.right_mount).yaw_rad
 
     def joint_angles(self, eyes_rad: Sequence[float]) -> tuple[float, float, float]:
         """Return the angles of the joints [rad] at angles of the optical axes; the inverse of `eye_angles`."""

@@ -17,6 +17,8 @@ from vergence_sim.model_builder import HIDDEN_GROUP
 Image = npt.NDArray[np.uint8]
 
 _GL_RGBA, _GL_UNSIGNED_BYTE = 0x1908, 0x1401
+_GL_FRAMEBUFFER, _GL_RENDERBUFFER, _GL_DEPTH_COMPONENT32F = 0x8D40, 0x8D41, 0x8CAC
+_GL_DEPTH_ATTACHMENT, _GL_STENCIL_ATTACHMENT = 0x8D00, 0x8D20
 # Simulators share a model, whose shapes outside a view are hidden while that view's scene is made.
 _MODEL_LOCK = threading.Lock()
 
@@ -36,6 +38,8 @@ class EyeRenderer:
             self._context.make_current()
             self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
             self._gl = _opengl()
+            if not self._mjr.offSamples:
+                self._drop_stencil()
         except Exception as error:
             raise RenderError(
                 f"MuJoCo cannot render offscreen with MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}: {error}; install "
@@ -83,6 +87,15 @@ class EyeRenderer:
                 self._model, data, self._options, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
             )
             groups[:] = visible
+
+    def _drop_stencil(self) -> None:
+        """Give the frame a depth buffer alone: with a stencil, which only reflections need, it is twice as large."""
+        gl, buffer, size_px = self._gl, self._mjr.offDepthStencil, (self._mjr.offWidth, self._mjr.offHeight)
+        gl.glBindFramebuffer(_GL_FRAMEBUFFER, self._mjr.offFBO)
+        gl.glFramebufferRenderbuffer(_GL_FRAMEBUFFER, _GL_STENCIL_ATTACHMENT, _GL_RENDERBUFFER, 0)
+        gl.glBindRenderbuffer(_GL_RENDERBUFFER, buffer)
+        gl.glRenderbufferStorage(_GL_RENDERBUFFER, _GL_DEPTH_COMPONENT32F, *size_px)
+        gl.glFramebufferRenderbuffer(_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_RENDERBUFFER, buffer)
 
     def _read(self, viewport: Any) -> Image:
         """Return the pixels just drawn (h, w, 3) BGR, rows upwards."""

@@ -162,7 +162,8 @@ class Perception:
         """Return whether the joints rest where commanded (3,), or turn along with the target unless `at_rest`."""
         along = np.zeros(3) if at_rest else self.tracking.joint_rates_rad_s(now_s)
         slow = self.history.speed_within(self.history.newest_s - 0.015, now_s, along) < _STILL_SPEED_RAD_S
-        return slow and self.distance_rad(command_rad) < _ARRIVED_RAD + _COMMANDED_AHEAD_S * float(np.abs(along).max())
+        ahead_rad = _COMMANDED_AHEAD_S * max(map(abs, along.tolist()))
+        return slow and self.distance_rad(command_rad) < _ARRIVED_RAD + ahead_rad
 
     def reached(self, joints_rad: Array) -> bool:
         """Return whether the joints are reported at these angles (3,); a joint whose angle is NaN is not compared."""
@@ -170,8 +171,8 @@ class Perception:
 
     def distance_rad(self, joints_rad: Array) -> float:
         """Return how far the farthest joint is reported from these angles (3,) [rad], NaN left out."""
-        off = np.abs(self.history.reported_rad - joints_rad)
-        return float(np.where(np.isfinite(off), off, 0.0).max())
+        off = (self.history.reported_rad - joints_rad).tolist()
+        return max(abs(one) if math.isfinite(one) else 0.0 for one in off)
 
     def _update_target(self, observation: Observation, now_s: float) -> bool:
         if isinstance(observation, PointSighting):

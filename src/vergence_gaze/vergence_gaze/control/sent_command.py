@@ -40,9 +40,12 @@ class SentCommand:
 
     def note_limits(self, desired_rad: Array, limits: CommandLimits) -> None:
         """Record whether the head's own limits allow the desired angles (3,)."""
-        finite = np.isfinite(desired_rad)
-        beyond = np.abs(desired_rad - limits.nearest(np.where(finite, desired_rad, 0.0)))[finite]
-        self.beyond_limits = bool(beyond.size and beyond.max() > _LIMITED_RAD)
+        desired = [angle if math.isfinite(angle) else 0.0 for angle in desired_rad.tolist()]
+        beyond = np.array(desired) - limits.nearest(np.array(desired))
+        self.beyond_limits = any(
+            abs(off) > _LIMITED_RAD and math.isfinite(angle)
+            for off, angle in zip(beyond.tolist(), desired_rad.tolist(), strict=True)
+        )
 
     def describe(self, before: Rig, after: Rig) -> None:
         """Keep the joints where they are under another description of the head."""

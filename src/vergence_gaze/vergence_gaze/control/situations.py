@@ -37,7 +37,7 @@ def situation_of(
         active=active,
         has_target=has_target,
         unseen_s=perception.unseen_s(state.now_s),
-        residual_rad=float(np.abs(residual).max()),
+        residual_rad=max(map(abs, residual.tolist())),
         eyes_still=perception.eyes_still(state.now_s, state.commanded_rad, law.lands_at_rest),
         travel_s=float((np.abs(residual) / state.speed_rad_s).max()),
         verged=perception.judge.verged,

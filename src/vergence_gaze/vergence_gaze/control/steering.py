@@ -1,6 +1,7 @@
 """Where the eyes are to turn in each cycle: phases, law, search, and what is asked of the tracker and the detector."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -197,7 +198,8 @@ class Steering:
         unseen = not self._perception.unseen_s(now_s) <= self._p.target.lost_after_s
         if self._verges_on_sight and unseen and self.requests.ask_for_view(self._new_id(), now_s):
             self._phases.enter(Phase.VERGE, "no goal: verging on what the left eye looks at", now_s)
-        situation = self._situation(self._control_input(now_s, command_rad, elapsed_s, speed_rad_s))
+        state = self._control_input(now_s, command_rad, elapsed_s, speed_rad_s)
+        situation = self._situation(state)
         phase = self._phases.update(situation)
         resting = situation.eyes_still and situation.residual_rad <= self._p.saccade.threshold_rad
         self.requests.ask_at_point(resting, now_s)
@@ -209,7 +211,7 @@ class Steering:
             return _UNKNOWN
         if phase is Phase.SACCADE and self._perception.judge.verged:
             self._perception.judge.restart("a saccade to the target is under way")
-        return self._law.compute_command(self._control_input(now_s, command_rad, elapsed_s, speed_rad_s))
+        return self._law.compute_command(state if phase is state.phase else replace(state, phase=phase))
 
     def fault(self, now_s: float) -> str:
         """Return what is wrong with the joints' feedback, or else with the images; "" if nothing is."""

@@ -71,9 +71,10 @@ class ImmFilter:
     def _moments(self, weights: Array) -> tuple[Array, Array]:
         one, other = self.modes
         apart = one.state - other.state
-        state = weights[0] * one.state + weights[1] * other.state
-        covariance = weights[0] * one.covariance + weights[1] * other.covariance
-        return state, covariance + weights[0] * weights[1] * np.outer(apart, apart)
+        first, second = weights.tolist()
+        state = first * one.state + second * other.state
+        covariance = first * one.covariance + second * other.covariance
+        return state, covariance + first * second * (apart[:, None] * apart)
 
 
 def _normalised(weights: Array) -> Array:

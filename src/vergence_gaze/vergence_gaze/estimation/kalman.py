@@ -15,6 +15,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 VERSION, VERGENCE, TILT = 0, 2, 4
+_IDENTITY = np.eye(6)
 _DEPTH_SHARE = 0.25
 """Vergence accelerates less than directions do: a quarter of it at 0.5 m already is a metre per second squared."""
 _RATE_HOLDS_S = 0.15
@@ -79,7 +80,7 @@ class KalmanFilter:
 
     def predict(self, duration_s: float) -> None:
         """Predict the state `duration_s` ahead."""
-        transition = np.eye(6)
+        transition = _IDENTITY.copy()
         noise = np.zeros((6, 6))
         for i, acceleration in self._accelerations.items():
             noise[i, i] = self._drift**2 * duration_s
@@ -102,7 +103,8 @@ class KalmanFilter:
         late_s = now_s - measurement.stamp_s - _RATE_HOLDS_S
         if self.moves and late_s > 0:
             noise = noise + (0.5 * self._accelerations[VERSION] * late_s**2) ** 2
-        covariance = jacobian @ self.covariance @ jacobian.T + np.diag(noise)
+        covariance = jacobian @ self.covariance @ jacobian.T
+        covariance.flat[:: len(noise) + 1] += noise
         value = measurement.values - jacobian @ self.state
         distance = float(value @ np.linalg.solve(covariance, value))
         return Innovation(jacobian, value, noise, covariance, distance)
@@ -112,5 +114,5 @@ class KalmanFilter:
         gain = np.linalg.solve(innovation.covariance, innovation.jacobian @ self.covariance).T
         self.state = self.state + gain @ innovation.value
         # Joseph's form: the short one loses its positive variances where a certain measurement meets a vague prior.
-        kept = np.eye(6) - gain @ innovation.jacobian
+        kept = _IDENTITY - gain @ innovation.jacobian
         self.covariance = kept @ self.covariance @ kept.T + (gain * innovation.noise) @ gain.T

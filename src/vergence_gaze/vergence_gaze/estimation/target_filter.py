@@ -182,7 +182,9 @@ class TargetFilter:
             self._rest.predict(duration_s)
             self._motion.predict(duration_s)
             for model in (self._rest, *self._motion.modes):
-                model.covariance *= min(1.0, _LARGEST_VARIANCE / max(float(model.covariance.diagonal().max()), 1e-12))
+                largest = max(model.covariance.diagonal().tolist())
+                if largest > _LARGEST_VARIANCE:
+                    model.covariance *= _LARGEST_VARIANCE / largest
             self._time_s = stamp_s
 
     def _within_gate(self, measurement: Measurement, rest: Innovation, motion: tuple[Innovation, Innovation]) -> bool:

@@ -254,9 +254,10 @@ class TargetTracking(TargetEstimator):
         if self._history.speed_within(first - _RESTED_S, last) > 0.0:
             return False
         at_left, at_right = self._history.shaft_at(stamp_s), self._history.shaft_at(last)
-        axes_rad, before_rad = np.array([at_left[0], at_right[1], at_left[2]]), self._history.half_play_rad.copy()
+        axes_rad, before_rad = np.array([at_left[0], at_right[1], at_left[2]]), self._history.half_play_rad
         self._history.play.observe(stamp_s, seen_rad - axes_rad)
-        return bool(np.abs(self._history.half_play_rad - before_rad).max() > _LEARNT_RAD)
+        now_rad = self._history.half_play_rad
+        return now_rad is not before_rad and bool(np.abs(now_rad - before_rad).max() > _LEARNT_RAD)
 
 
 __all__ = ["SightingError", "TargetTracking"]

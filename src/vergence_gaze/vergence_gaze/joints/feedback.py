@@ -36,8 +36,8 @@ class FeedbackMonitor:
 
     def retry(self) -> None:
         """Let joints that did not follow be tried again: there is a new goal."""
-        self._rests_at = np.full(3, math.nan)
-        self._off_since_s = np.full(3, math.inf)
+        self._rests_at = [math.nan] * 3
+        self._off_since_s = [math.inf] * 3
 
     def update(
         self, now_s: float, history: ShaftHistory, sent_rad: Array | None, driven: npt.NDArray[np.bool_], refusal: str
@@ -60,7 +60,7 @@ class FeedbackMonitor:
             self._on_time_s = now_s
         self.fault = self._timing_fault(now_s, refusal)
         if self.fault or sent_rad is None:
-            self._off_since_s[:] = math.inf
+            self._off_since_s = [math.inf] * 3
         else:
             self.fault = self._joint_fault(now_s, history.reported_rad, sent_rad, driven)
         return self.fault
@@ -74,12 +74,16 @@ class FeedbackMonitor:
         return ""
 
     def _joint_fault(self, now_s: float, reported_rad: Array, sent_rad: Array, driven: npt.NDArray[np.bool_]) -> str:
-        rests = np.abs(reported_rad - self._rests_at) <= _MOVED_RAD
-        self._rests_at = np.where(rests, self._rests_at, reported_rad)
-        off = rests & driven & (np.abs(sent_rad - reported_rad) > _OFF_RAD)
-        self._off_since_s = np.where(off, np.minimum(self._off_since_s, now_s), math.inf)
-        stuck = np.flatnonzero(now_s - self._off_since_s > _PERSISTS_S)
-        if not stuck.size:
+        stuck = []
+        for i, (reported, sent) in enumerate(zip(reported_rad.tolist(), sent_rad.tolist(), strict=True)):
+            rests = abs(reported - self._rests_at[i]) <= _MOVED_RAD
+            if not rests:
+                self._rests_at[i] = reported
+            off = rests and driven[i] and abs(sent - reported) > _OFF_RAD
+            self._off_since_s[i] = min(self._off_since_s[i], now_s) if off else math.inf
+            if now_s - self._off_since_s[i] > _PERSISTS_S:
+                stuck.append(i)
+        if not stuck:
             return ""
         places = ", ".join(
             f"{JOINT_NAMES[i]} is reported at {math.degrees(reported_rad[i]):.1f} deg, commanded to "

@@ -75,6 +75,7 @@ class PlayEstimator:
 
     def __init__(self, described_half_play_rad: Array, learning_share: float) -> None:
         self.half_play_rad: Array = described_half_play_rad.copy()
+        """Another array whenever it changes."""
         # A target that sets off is taken for lost motion once, before it is known to move.
         self._most_rad = np.maximum(_MOST_TIMES * described_half_play_rad, _LEAST_LIMIT_RAD)
         self.learning_share = learning_share
@@ -153,4 +154,5 @@ class PlayEstimator:
     def _learn(self, i: int, play_rad: float) -> None:
         half_rad = float(self.half_play_rad[i])
         half_rad += self.learning_share * (0.5 * play_rad - half_rad)
+        self.half_play_rad = self.half_play_rad.copy()
         self.half_play_rad[i] = min(half_rad, float(self._most_rad[i]))

@@ -5,6 +5,8 @@ the same direction is exact, reversing first crosses the play. So the inverse ov
 direction of motion, and is slow to reverse: a joint that reversed at every noisy residual would never rest.
 """
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -28,14 +30,15 @@ class ServoInverse:
         described = np.array([servo.half_play_rad for servo in servos])
         # The next step would be no nearer.
         unresolved = _STEP_SHARE * pulse_steps_rad(rig)
-        self._tolerance = np.maximum(tolerance_rad + _MOVE_SHARE * described, unresolved)
-        self._turn_tolerance = np.maximum(tolerance_rad + 2.0 * _TURN_SHARE * described, unresolved)
+        self._tolerance: list[float] = np.maximum(tolerance_rad + _MOVE_SHARE * described, unresolved).tolist()
+        turn_tolerance = np.maximum(tolerance_rad + 2.0 * _TURN_SHARE * described, unresolved)
+        self._turn_tolerance: list[float] = turn_tolerance.tolist()
         self._compensation = parameters.play_compensation
-        self._direction = np.zeros(3)
+        self._direction = [0.0] * 3
 
     def reset(self) -> None:
         """Forget each joint's last direction: the joints were moved by something else."""
-        self._direction = np.zeros(3)
+        self._direction = [0.0] * 3
 
     def command(self, desired_rad: Array, shaft_rad: Array, commanded_rad: Array, half_play_rad: Array) -> Array:
         """Return the command (3,) that brings the shafts to `desired_rad` (3,).
@@ -46,11 +49,11 @@ class ServoInverse:
             commanded_rad: the last command sent.
             half_play_rad: half of each joint's play, as far as it is known.
         """
-        command = commanded_rad.copy()
-        arriving = np.clip(shaft_rad, commanded_rad - half_play_rad, commanded_rad + half_play_rad)
-        for i in range(3):
-            error = desired_rad[i] - arriving[i]
-            if not np.isfinite(error):
+        command, desired, half_play = commanded_rad.tolist(), desired_rad.tolist(), half_play_rad.tolist()
+        for i, shaft in enumerate(shaft_rad.tolist()):
+            arriving = min(max(shaft, command[i] - half_play[i]), command[i] + half_play[i])
+            error = desired[i] - arriving
+            if not math.isfinite(error):
                 continue
             direction = 1.0 if error > 0 else -1.0
             turning = direction != self._direction[i]
@@ -58,6 +61,6 @@ class ServoInverse:
                 continue
             self._direction[i] = direction
             # A long way is overdriven in full; a short way back in part: an overestimated play must not overshoot.
-            share = self._compensation if turning and abs(error) < 4.0 * half_play_rad[i] else 1.0
-            command[i] = desired_rad[i] + direction * half_play_rad[i] * share
-        return command
+            share = self._compensation if turning and abs(error) < 4.0 * half_play[i] else 1.0
+            command[i] = desired[i] + direction * half_play[i] * share
+        return np.array(command)

@@ -8,7 +8,6 @@ servo turns in a small part of the time between two reports; the commands and th
 import math
 from collections import deque
 from collections.abc import Mapping
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +22,7 @@ _KEEP_S = 3.0
 _HOLD_S = 0.2
 _CLOCK_JUMP_S = 1.0
 _MOST_COMMANDS = 1000
+_MOST_FOUND = 32  # angles kept where no report and no command comes that ends them
 _INSTANT_S = 1e-4
 _STILL = np.zeros(3)
 
@@ -40,6 +40,8 @@ class ShaftHistory:
         self._commands: deque[tuple[float, Array]] = deque(maxlen=_MOST_COMMANDS)
         self._reported = JointHistory(_KEEP_S, _HOLD_S)
         self._shafts = JointHistory(_KEEP_S, _HOLD_S)
+        self._found: dict[float, Array] = {}  # of `shaft_at`, since the last change
+        self._found_with = self.play.half_play_rad
 
     @property
     def known(self) -> bool:
@@ -59,7 +61,7 @@ class ShaftHistory:
     @property
     def shaft_rad(self) -> Array:
         """The newest estimated shaft angles (3,), with the play as it is known by now."""
-        return self._carried(self._shafts.newest.angles_rad, self.reported_rad)
+        return self.shaft_at(math.inf)
 
     @property
     def sent_rad(self) -> Array:
@@ -91,6 +93,7 @@ class ShaftHistory:
         # False for a NaN, too.
         angles = np.array([new if abs(new) <= math.tau else old for new, old in zip(values, before, strict=True)])
         shafts = self._shafts.newest.angles_rad if self.known else angles
+        self._found.clear()
         if not self._reported.add_angles(stamp_s, angles):
             return False
         self.play.follow(stamp_s, angles)
@@ -101,12 +104,14 @@ class ShaftHistory:
         self._reported.clear()
         self._shafts.clear()
         self._commands.clear()
+        self._found.clear()
         self.play.forget_way()
 
     def on_command(self, now_s: float, angles_rad: Array) -> None:
         """Record a command (3,) that is sent now: the joints begin to turn after it by their servos' latency."""
         if not self._commands or now_s > self._commands[-1][0]:
             self._commands.append((now_s, angles_rad))
+            self._found.clear()
 
     def sent_since(self, stamp_s: float) -> float:
         """Return how far the newest command is from the last one before a stamp, of the farthest joint [rad]."""
@@ -118,9 +123,15 @@ class ShaftHistory:
         return self._reported.covers(stamp_s)
 
     def shaft_at(self, stamp_s: float) -> Array:
-        """Return the estimated shaft angles (3,) at `stamp_s`; the ends are held."""
-        before, _ = self._shafts.bracket(stamp_s)
-        return self._carried(before.angles_rad, self.reported_at(stamp_s))
+        """Return the estimated shaft angles (3,) at `stamp_s`; the ends are held. They must not be changed."""
+        if self._found_with is not self.half_play_rad or len(self._found) > _MOST_FOUND:
+            self._found_with = self.half_play_rad
+            self._found.clear()
+        found = self._found.get(stamp_s)
+        if found is None:
+            before, _ = self._shafts.bracket(stamp_s)
+            found = self._found[stamp_s] = self._carried(before.angles_rad, self.reported_at(stamp_s))
+        return found
 
     def reported_at(self, stamp_s: float) -> Array:
         """Return the angles (3,) at `stamp_s` as they would have been reported then; the ends are held."""
@@ -137,12 +148,18 @@ class ShaftHistory:
 
         With `along_rad_s` (3,) it is the speed relative to these: how fast the eyes slip off a target that moves so.
         """
-        samples = self._reported.spanning(begin_s, end_s)
         fastest, along = 0.0, along_rad_s.tolist()
-        for (began_s, before), (ended_s, after) in pairwise(samples):
-            duration_s = max(ended_s - began_s, 1e-4)
-            for first, last, own in zip(before.tolist(), after.tolist(), along, strict=True):
-                fastest = max(fastest, abs((last - first) / duration_s - own))
+        before: list[float] | None = None
+        began_s = math.nan
+        for ended_s, angles_rad in self._reported.spanning(begin_s, end_s):
+            after = angles_rad.tolist()
+            if before is not None:
+                duration_s = max(ended_s - began_s, _INSTANT_S)
+                for first, last, own in zip(before, after, along, strict=True):
+                    speed = abs((last - first) / duration_s - own)
+                    if speed > fastest:
+                        fastest = speed
+            began_s, before = ended_s, after
         return fastest
 
     def _turning_from(self, onset_s: Array, before: JointSample, after: JointSample, stamp_s: float) -> Array:

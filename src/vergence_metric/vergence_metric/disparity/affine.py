@@ -7,6 +7,7 @@ together; the normal matrix depends on the left image alone and is factored once
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -165,36 +166,40 @@ class _Window:
     """The left image about the point as a linear model: `design` (8, N) are the six affine increments, gain, offset.
 
     Of its N = n x n samples, `stride_px` apart, `offsets` are u (1, n) and v (n, 1) from the point [px], `gradients`
-    across and down (n, n), `roots` (N) those of the weights, which sum to 1, `weighted` is their product with the
-    design and `inverse` (8, 8) that of the normal matrix; `texture` is the weighted deviation of the grey levels.
+    (2, n, n) those across and down, `roots` (N) those of the weights, which sum to 1, `weighted` is their product with
+    the design and `inverse` (8, 8) that of the normal matrix; `texture` is the weighted deviation of the grey levels.
     """
 
     stride_px: int
     offsets: tuple[NDArray[np.floating], NDArray[np.floating]]
-    gradients: tuple[NDArray[np.floating], NDArray[np.floating]]
+    gradients: NDArray[np.floating]
     roots: Matrix
     design: Matrix
     weighted: Matrix
     inverse: Matrix
     texture: float
 
+    @cached_property
+    def _buffers(self) -> tuple[Matrix, Matrix, NDArray[np.float32]]:
+        """Arrays as large as `gradients` that every iteration reuses."""
+        shape = self.gradients.shape
+        return np.empty(shape), np.empty(shape), np.empty(shape, np.float32)
+
     def seen(self, right: Strip, point_px: tuple[float, float], warp: Warp, gain: float) -> Matrix:
         """Return what the right image shows at the warped offsets (N)."""
         # remap of OpenCV 4 rounds to a grid, that of OpenCV 5 does not: round first, make good what that misses.
-        maps, missed = [], []
-        for (across, down, shift), at, first, gradient in zip(
-            warp, point_px, (right.x0, right.y0), self.gradients, strict=True
-        ):
-            steps = (_REMAP_STEPS * across) * self.offsets[0] + (
-                (_REMAP_STEPS * down) * self.offsets[1] + _REMAP_STEPS * (shift + at - first)
-            )
-            near = np.rint(steps)
-            maps.append(near.astype(np.float32) * np.float32(1.0 / _REMAP_STEPS))
-            steps -= near
-            steps *= gradient
-            missed.append(steps)
+        steps, near, maps = self._buffers
+        (u, v), first = self.offsets, (right.x0, right.y0)
+        for i, (across, down, shift) in enumerate(warp):
+            fixed = (_REMAP_STEPS * down) * v + _REMAP_STEPS * (shift + point_px[i] - first[i])
+            np.add((_REMAP_STEPS * across) * u, fixed, out=steps[i])
+        np.rint(steps, out=near)
+        maps[...] = near
+        maps *= np.float32(1.0 / _REMAP_STEPS)
         sampled = cv2.remap(right.grey, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        seen = missed[0] + missed[1]
+        steps -= near
+        steps *= self.gradients
+        seen = steps[0] + steps[1]
         seen *= gain / _REMAP_STEPS
         seen += sampled
         return np.asarray(seen.ravel())
@@ -206,7 +211,7 @@ class _Window:
         blocks before it is squared, as in estimates consistent under autocorrelation (Newey and West, 1987).
         """
         effect = self.roots * np.einsum("i,in->n", self.inverse[0], self.weighted) * residual
-        effect = effect.reshape(self.gradients[0].shape)
+        effect = effect.reshape(self.gradients.shape[1:])
         side = -(-_BLOCK_PX // self.stride_px)
         blocks = cv2.boxFilter(effect, -1, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT)
         return math.sqrt(float((blocks**2).sum())) / side
@@ -226,7 +231,10 @@ def _linearised(
         return left.grey[rows, x + first + right : x + last + right + 1 : stride]
 
     patch = shifted(0, 0).astype(np.float64)
-    gx, gy = 0.5 * (shifted(1, 0) - shifted(-1, 0)), 0.5 * (shifted(0, 1) - shifted(0, -1))
+    gradients = np.empty((2, *patch.shape), left.grey.dtype)
+    np.subtract(shifted(1, 0), shifted(-1, 0), out=gradients[0])
+    np.subtract(shifted(0, 1), shifted(0, -1), out=gradients[1])
+    gradients *= 0.5
     u = (offsets + (x + left.x0 - point_px[0]))[None, :]
     v = (offsets + (y + left.y0 - point_px[1]))[:, None]
     across, down = np.exp(-0.5 * (u / sigma) ** 2), np.exp(-0.5 * (v / sigma) ** 2)
@@ -242,11 +250,13 @@ def _linearised(
         roots /= math.sqrt(share)
     centred = patch - float((roots * roots * patch).sum())
     # Offsets are scaled by the window, so that the rows of the design are of one size.
-    parts = [gx, gx * (u / sigma), gx * (v / sigma), gy, gy * (u / sigma), gy * (v / sigma), centred]
-    design = np.empty((8, patch.size))
-    for row, part in zip(design[:7], parts, strict=True):
-        row[:] = part.ravel()
-    design[7] = 1.0
+    design = np.empty((8, *patch.shape))
+    for part, gradient in zip((design[:3], design[3:6]), gradients, strict=True):
+        part[0] = gradient
+        np.multiply(gradient, u / sigma, out=part[1])
+        np.multiply(gradient, v / sigma, out=part[2])
+    design[6], design[7] = centred, 1.0
+    design = design.reshape(8, -1)
     weighted = design * roots.ravel()
     # OpenCV and einsum, not matmul: BLAS threads wait for one another whenever other nodes hold the cores.
     normal = cv2.mulTransposed(weighted, False)
@@ -257,7 +267,7 @@ def _linearised(
     except np.linalg.LinAlgError:
         return None
     texture = math.sqrt(float(normal[6, 6]))
-    return _Window(stride, (u, v), (gx, gy), roots.ravel(), design, weighted, inverse, texture)
+    return _Window(stride, (u, v), gradients, roots.ravel(), design, weighted, inverse, texture)
 
 
 def _damping(sigma: float, share: float) -> Matrix:

@@ -164,7 +164,8 @@ def _self_correlation(pair: FoveaPair, layer: Profile) -> Profile:
     left = pair.full[0] if layer.scale == 1 else pair.half[0]
     at = (round(pair.point_px[0] / layer.scale), round(pair.point_px[1] / layer.scale))
     reach = len(layer.values) // 2
-    surface = correlate(left, left, at, layer.window_px / layer.scale, (-reach, reach), (-1, 1))
+    sigma, texture = layer.window_px / layer.scale, layer.surface.texture
+    surface = correlate(left, left, at, sigma, (-reach, reach), (-1, 1), texture=texture)
     return replace(layer, values=surface.profile, surface=surface)
 
 

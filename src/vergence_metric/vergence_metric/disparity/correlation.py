@@ -171,6 +171,7 @@ def correlate(
     v_range: tuple[int, int],
     sign: int = -1,
     down: float = 0.0,
+    texture: Texture | None = None,
 ) -> Surface:
     """Correlate the window about a point of one eye with the other eye's, for every whole shift in a range.
 
@@ -183,6 +184,7 @@ def correlate(
         v_range: first and last vertical disparity, inclusive.
         sign: -1 from left to right (x_right = x_left - d), +1 from right to left.
         down: of the window in the way down; 0 for one as high as wide.
+        texture: of the window, where it is known already.
 
     Returns:
         Surface of shape (v_last - v_first + 1, d_last - d_first + 1).
@@ -191,7 +193,7 @@ def correlate(
     down = down or sigma
     rx, ry, weights = radius_of(sigma), radius_of(down), _window(sigma, down)
     patch = _patch(source, at, rx, ry)
-    texture = texture_of(patch, sigma, down)
+    texture = texture or texture_of(patch, sigma, down)
     kernel = weights * (patch - _sum(weights, patch))
 
     xs = sorted(at[0] + sign * d for d in d_range)

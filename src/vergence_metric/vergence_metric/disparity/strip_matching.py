@@ -23,6 +23,7 @@ LARGEST_HALF_PX = max(_COARSE_HALF_PX[1], _FINE_HALF_PX[1], _RETURN_HALF_PX[1])
 """Rows above and below the point that any strip covers, beside the vertical disparity."""
 
 _GRAIN = 16  # OpenCV searches whole multiples of this
+_STEPS = 16  # of OpenCV's disparities in a pixel
 
 
 @dataclass(frozen=True)
@@ -101,4 +102,7 @@ def _match(crops: list[Image], low: int, count: int) -> NDArray[np.float32]:
         mode=cv2.STEREO_SGBM_MODE_HH,
     )
     fixed = matcher.compute(*crops)
-    return np.where(fixed >= 16 * low, fixed / 16.0, np.nan).astype(np.float32)
+    disparity_px = fixed.astype(np.float32)
+    disparity_px *= np.float32(1.0 / _STEPS)
+    disparity_px[fixed < _STEPS * low] = np.nan
+    return disparity_px

@@ -216,7 +216,7 @@ class RememberedPatch:
         """
         scale, reach = size[1], -(-reach_px // size[1])
         template = self._template(image, view, expected, size, own)
-        if float(template.image.std()) < _LEAST_CONTRAST:
+        if cv2.meanStdDev(template.image)[1][0, 0] < _LEAST_CONTRAST:
             return [], float(reach_px)
         at = (round(expected[0]), round(expected[1]))
         left, top, right, bottom = (scale * (side + reach) for side in template.sides)
