@@ -43,7 +43,7 @@ def test_own_pixels_are_those_of_the_stick_and_not_of_the_wall():
     assert not mask[: round(AT[1]) - 48].any()
 
 
-def test_edges_along_the_baseline_are_nobodys_own():
+def test_edges_along_the_baseline_fit_at_every_disparity_and_are_left_out():
     stripes = np.tile((np.arange(480) // 6 % 2 * 80 + 80).astype(np.uint8)[:, None], (1, 640))
     assert not own_pixels(stripes, stripes, AT, 5.0, 48).any()
 
