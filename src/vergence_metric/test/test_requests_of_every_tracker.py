@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from vergence_metric.disparity.semi_global import SemiGlobalEstimator
 from vergence_metric.testing.rendered_boards import Stage, gaze, true_pixel
 from vergence_metric.tracking import cluster_follower
 from vergence_metric.tracking.corner_cluster import CornerCluster
@@ -121,6 +122,32 @@ def test_a_new_request_replaces_the_old_one(stage):
     for _ in range(8):
         free = stage.show(PLACE, gaze(PLACE))
     assert (free.status, free.goal_id) == (TrackStatus.OK, 0), free.reason
+
+
+def test_the_right_eye_sees_the_same_corners_after_a_saccade_across_and_up(monkeypatch):
+    cv2.setRNGSeed(1)
+    stage, high = Stage("corner_cluster"), PLACE + np.array([0.0, 0.0, 0.13])
+    middle = gaze(PLACE + np.array([0.0, 0.0, 0.06]))
+    stage.show(high, gaze(PLACE))
+    pixel = true_pixel(high, True, gaze(PLACE))
+    stage.tracker.request(TrackRequest(5, stage.pair.stamp_s, True, (float(pixel[0]), float(pixel[1]))), stage.pair)
+    for eyes in (middle, gaze(high)):
+        track = stage.show(high, eyes)
+        assert track.status is TrackStatus.OCCLUDED
+        assert "saccade" in track.reason
+    searches = []
+    estimate_at = SemiGlobalEstimator.estimate_at
+
+    def counted(self, *arguments):
+        searches.append(arguments)
+        return estimate_at(self, *arguments)
+
+    monkeypatch.setattr(SemiGlobalEstimator, "estimate_at", counted)
+    for _ in range(5):
+        track = stage.show(high, gaze(high))
+    assert track.status is TrackStatus.OK, track.reason
+    assert abs(stage.errors[-1][2]) < 0.5
+    assert not searches
 
 
 @pytest.mark.parametrize(
