@@ -30,8 +30,8 @@ def stage(request):
     return Stage(request.param)
 
 
-def ask(stage, eyes, left_eye=True, goal_id=5):
-    pixel = true_pixel(PLACE, left_eye, eyes)
+def ask(stage, eyes, left_eye=True, goal_id=5, place=PLACE):
+    pixel = true_pixel(place, left_eye, eyes)
     request = TrackRequest(goal_id, stage.pair.stamp_s, left_eye, (float(pixel[0]), float(pixel[1])))
     stage.tracker.request(request, stage.pair)
 
@@ -129,8 +129,7 @@ def test_the_right_eye_sees_the_same_corners_after_a_saccade_across_and_up(monke
     stage, high = Stage("corner_cluster"), PLACE + np.array([0.0, 0.0, 0.13])
     middle = gaze(PLACE + np.array([0.0, 0.0, 0.06]))
     stage.show(high, gaze(PLACE))
-    pixel = true_pixel(high, True, gaze(PLACE))
-    stage.tracker.request(TrackRequest(5, stage.pair.stamp_s, True, (float(pixel[0]), float(pixel[1]))), stage.pair)
+    ask(stage, gaze(PLACE), place=high)
     for eyes in (middle, gaze(high)):
         track = stage.show(high, eyes)
         assert track.status is TrackStatus.OCCLUDED
