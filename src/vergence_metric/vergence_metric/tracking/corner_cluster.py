@@ -120,7 +120,7 @@ class CornerCluster:
         window_px = round(self._half_px + reach_px)
         # What is around the target has corners too, and the more the farther it is searched.
         most = min(round(_MOST_FOUND * (window_px / self._half_px) ** 2), 3 * _MOST_FOUND)
-        found = find_corners(pair.left, (expected[0], expected[1]), window_px, most, _APART_PX - 2.0)
+        found = find_corners(pair.left, (expected[0], expected[1]), window_px, most, _APART_PX - 2.0, again=True)
         if not len(found):
             return "there are no corners where it is predicted"
         matched = match_corners(pair.left, left_view, found, self.corners, self._cameras[0], expected, reach_px, hidden)

@@ -12,18 +12,24 @@ Points = NDArray[np.float64]
 Patches = NDArray[np.float32]
 
 _SIDE_PX = 9
-_QUALITY = 0.01
+_QUALITY = 0.01  # of the strongest corner: least strength of one that is learnt
+_QUALITY_AGAIN = 0.002  # and of one that may be known: what passes beside a target has stronger corners
 _BLOCK_PX = 3
 _LEAST_CONTRAST = 3.0  # grey levels, standard deviation
 _AREA = _SIDE_PX * _SIDE_PX
 _ACROSS = np.arange(_SIDE_PX, dtype=np.float32) - (_SIDE_PX - 1) / 2
 
 
-def find_corners(image: Image, center_px: Pixel, half_px: int, most: int, apart_px: float) -> Points:
-    """Return up to `most` corners (N, 2) [px] of an image (h, w) in the square about a point, `apart_px` apart."""
+def find_corners(
+    image: Image, center_px: Pixel, half_px: int, most: int, apart_px: float, again: bool = False
+) -> Points:
+    """Return up to `most` corners (N, 2) [px] of an image (h, w) in the square about a point, `apart_px` apart.
+
+    Weaker ones too where known corners are looked for `again`.
+    """
     x0, y0 = round(center_px[0]) - half_px, round(center_px[1]) - half_px
     area = cut(image, x0, y0, 2 * half_px + 1, 2 * half_px + 1)
-    found = cv2.goodFeaturesToTrack(area, most, _QUALITY, apart_px, blockSize=_BLOCK_PX)
+    found = cv2.goodFeaturesToTrack(area, most, _QUALITY_AGAIN if again else _QUALITY, apart_px, blockSize=_BLOCK_PX)
     if found is None:
         return np.empty((0, 2))
     corners = np.ascontiguousarray(np.asarray(found, np.float32).reshape(-1, 1, 2))
