@@ -25,6 +25,7 @@ from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.registry import tracker_names
 
 _DEFAULT = TrackerParameters().kind
+_REPEATS = {"corner_cluster": 2, _DEFAULT: 2}  # of those whose cost is compared with a goal
 _BEFORE_HALF, _AFTER_HALF = range(4, 14), range(55, 75)  # pairs of the scene half_hidden
 _COLUMNS = ("rms_px", "drift_px", "lost", "false_locks", "reacquired_s", "ms")
 _PREFIX = "tracker."
@@ -87,7 +88,7 @@ def _rendered(say: Say) -> tuple[Scores, dict[tuple[str, str], float]]:
 def _runs(frames: list[Frame]) -> dict[str, Run]:
     head, runs = rig(), dict[str, Run]()
     for kind in tracker_names():
-        runs[kind], naive = run_tracker(kind, frames, head)
+        runs[kind], naive = run_tracker(kind, frames, head, repeats=_REPEATS.get(kind, 1))
         runs |= naive
     return runs
 
@@ -102,7 +103,7 @@ def _photographs(say: Say) -> list[Row]:
         every, boxes = dict[str, list[Score]](), list[GivenBoxes]()
         for number, (name, frames) in enumerate(found):
             for kind in tracker_names():
-                one, _ = run_tracker(kind, frames, head)
+                one, _ = run_tracker(kind, frames, head, repeats=_REPEATS.get(kind, 1))
                 every.setdefault(kind, []).append(score(frames, one))
             boxes.append(run_given_boxes(frames, head, number))
             every.setdefault(DETECTOR, []).append(score(frames, boxes[-1].run))

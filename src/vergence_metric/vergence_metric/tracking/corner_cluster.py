@@ -134,7 +134,7 @@ class CornerCluster:
             # The servos are not where they report: what the right eye sees says nothing of the distance.
             right: _Right | str = _Right(reason=_IN_SACCADE)
         else:
-            right = self._right_eye(pair, matched.known[agree], matched.px[agree])
+            right = self._right_eye(pair, matched, agree)
         if isinstance(right, str):
             return right
         return self._located(pair, matched, agree, right, hidden)
@@ -188,8 +188,9 @@ class CornerCluster:
         agree[~counting] = camera.agrees(structure[~counting], depths[~counting], matched.px[~counting])
         return agree
 
-    def _right_eye(self, pair: StoredPair, known: NDArray[np.intp], seen_px: Points) -> _Right | str:
+    def _right_eye(self, pair: StoredPair, matched: MatchedCorners, agree: NDArray[np.bool_]) -> _Right | str:
         """Return what the right eye sees of the corners that agree; why they are another thing's if it shows that."""
+        known, seen_px, patches = matched.known[agree], matched.px[agree], matched.patches[agree]
         left, right = self._cameras
         place = (float(left.origin_px[0]), float(left.origin_px[1]))
         weighed = None if self._depth.certain else self._depth.weigh(pair, place, self._estimator)
@@ -199,17 +200,17 @@ class CornerCluster:
         start = np.array([place[0] - expected_px, place[1] - self._down_px])
         structure = self.corners.structure
         guess = right.project(structure.points[known]) - right.origin_px + start
-        there, found = match_right(pair.left, pair.right, seen_px, guess, _ALIKE_RIGHT)
+        there, found = match_right(pair.left, pair.right, seen_px, guess, _ALIKE_RIGHT, patches)
         right.move(start)
         count = 0
         if found.sum() >= min(3, len(known)) and found.any():
             seen = known[found]
-            agree = right.fit(structure.points[seen], structure.depth_variance[seen], there[found])
-            count = int(agree.sum())
+            fits = right.fit(structure.points[seen], structure.depth_variance[seen], there[found])
+            count = int(fits.sum())
         across, down = (left.origin_px - right.origin_px).tolist()
         jump_px = self._parameters.disparity_jump_px
         if count >= max(2, len(known) / 3) and abs(across - expected_px) <= jump_px:
-            structure.observe(seen[agree], right, there[found][agree])
+            structure.observe(seen[fits], right, there[found][fits])
             return self._measured(pair, place, across, down, math.hypot(left.sigma_px, right.sigma_px))
         right.move(start)
         # A search about the expected disparity adds nothing to one over the whole range.

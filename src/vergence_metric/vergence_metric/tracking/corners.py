@@ -57,10 +57,16 @@ def patches_at(image: Image, points: Points) -> Patches:
 
 
 def match_right(
-    left: Image, right: Image, points: Points, expected: Points, least_correlation: float
+    left: Image,
+    right: Image,
+    points: Points,
+    expected: Points,
+    least_correlation: float,
+    patches: Patches | None = None,
 ) -> tuple[Points, NDArray[np.bool_]]:
     """Return where corners (N, 2) of the left image are in the right one, and which were found (N,).
 
+    `patches` are those of the left image at the corners (`patches_at`), where they are known already.
     Lucas and Kanade's flow from the `expected` places (N, 2); it must return, and what is there must look alike.
     """
     if not len(points):
@@ -85,5 +91,6 @@ def match_right(
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
     places = there.reshape(-1, 2).astype(np.float64) + starts[1]
-    alike = np.einsum("ij,ij->i", patches_at(left, points), patches_at(right, places))
+    there_patches, here_patches = patches_at(right, places), patches_at(left, points) if patches is None else patches
+    alike = np.einsum("ij,ij->i", here_patches, there_patches)
     return places, (found.ravel() == 1) & (alike >= least_correlation)
