@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator
 from vergence_metric.tracking.affine_transfer import AffineCamera
 from vergence_metric.tracking.corner_association import MatchedCorners, match_corners
-from vergence_metric.tracking.corners import find_corners, match_right, patches_at
+from vergence_metric.tracking.corners import find_corners, match_right, patches_at, strongest_corner
 from vergence_metric.tracking.direction_filter import DirectionFilter
 from vergence_metric.tracking.eye_view import Pixel, Points
 from vergence_metric.tracking.known_corners import KnownCorners
@@ -91,6 +91,7 @@ class CornerCluster:
         self._point = DirectionFilter(pair.views[0].angles(np.array([point])), self._sigma_rad)
         self.corners = self._no_corners()
         found = find_corners(pair.left, point, self._half_px, _MOST, _APART_PX)
+        self._strongest = strongest_corner(pair.left, point, self._half_px)
         # The depth of the surface about the point, by how its disparity changes over the image; or it faces the eyes.
         slopes = np.zeros(2) if disparity.surface is None else disparity.surface.slopes[0] / relief
         self._plane = max((np.zeros(2), slopes), key=lambda plane: len(self._members(pair, found, plane)[0]))
@@ -120,7 +121,7 @@ class CornerCluster:
         window_px = round(self._half_px + reach_px)
         # What is around the target has corners too, and the more the farther it is searched.
         most = min(round(_MOST_FOUND * (window_px / self._half_px) ** 2), 3 * _MOST_FOUND)
-        found = find_corners(pair.left, (expected[0], expected[1]), window_px, most, _APART_PX - 2.0, again=True)
+        found = find_corners(pair.left, (expected[0], expected[1]), window_px, most, _APART_PX - 2.0, self._strongest)
         if not len(found):
             return "there are no corners where it is predicted"
         matched = match_corners(pair.left, left_view, found, self.corners, self._cameras[0], expected, reach_px, hidden)
