@@ -72,6 +72,27 @@ def targets(name: str, count: int) -> list[Target]:
     return [Target(name, PhotoPoint(t["x_px"], t["y_px"], t["disparity_px"])) for t in chosen]
 
 
+def flattest(name: str, half_px: float) -> PhotoPoint:
+    """Return the point of a pair whose surroundings differ least in disparity, `half_px` or more from any border.
+
+    The points that were prepared, not those of scikit-image's pair.
+    """
+    described = _described()[name]
+    listed, last_x, last_y = described["targets"], described["width_px"], described["height_px"]
+    assert isinstance(listed, list)
+    assert isinstance(last_x, int)
+    assert isinstance(last_y, int)
+    inside = [
+        t
+        for t in listed
+        if half_px <= min(t["x_px"], t["x_px"] - t["disparity_px"], t["y_px"])
+        and max(t["x_px"], t["x_px"] - t["disparity_px"]) <= last_x - 1 - half_px
+        and t["y_px"] <= last_y - 1 - half_px
+    ]
+    best = min(inside, key=lambda t: float(t["spread_px"]))
+    return PhotoPoint(best["x_px"], best["y_px"], best["disparity_px"])
+
+
 @lru_cache(maxsize=2)
 def pair_of(name: str) -> PhotoPair:
     """Return a pair with the camera that is natural for its source."""

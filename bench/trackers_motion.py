@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.results import Row
-from bench.trackers_photographs import NoPhotographsError, photograph_rig, standing
+from bench.trackers_pasted import moving_pieces
+from bench.trackers_photographs import NoPhotographsError, photograph_rig, sequences, standing
 from bench.trackers_runs import stored
 from bench.trackers_scenes import SCENES, THINGS, Frame, Pose, Scene, rig, sequence
 from vergence_metric.tracking.eye_view import EyeView
@@ -22,7 +23,7 @@ from vergence_rig.rig import Rig
 
 Image = NDArray[np.uint8]
 
-_SETTLED = 12  # pairs until the target moves at its speed
+_SETTLED = 12  # pairs until the target moves at its speed, in the renderings and across photographs
 _BY_NAME = {scene.name: scene for scene in SCENES}
 _MOVING, _REST = _BY_NAME["20_deg_s"], (_BY_NAME["rest"], _BY_NAME["rig_yaw"])
 
@@ -69,11 +70,28 @@ def _rest_rows(say: Callable[[str], None]) -> list[Row]:
         say(f"moving target, {scene.name}")
     rows.append(Row("tracker.moving_target.rate", pairs / spent_s, "Hz at 320x240, of CPU time"))
     try:
-        standing_still = [_nothing(_regions(frames, horn_schunck, photograph_rig())) for _, frames in standing()]
+        return rows + _photograph_rows(say)
     except NoPhotographsError as error:
         say(str(error))
         return rows
-    return [*rows, Row("tracker.moving_target.photographs.no_mask", float(np.mean(standing_still)), "of pairs")]
+
+
+def _photograph_rows(say: Callable[[str], None]) -> list[Row]:
+    """Return the share of pairs without a mask where nothing moves in a photograph, and the masks of moving pieces."""
+    rows, head = [], photograph_rig()
+    for name, sequences_of in (("no_mask", standing), ("no_mask_eyes_turning", sequences)):
+        nothing = [_nothing(_regions(frames, horn_schunck, head)) for _, frames in sequences_of()]
+        rows.append(Row(f"tracker.moving_target.photographs.{name}", float(np.mean(nothing)), "of pairs"))
+        say(f"moving target, photographs, {name}")
+    for name, follow in (("still_eyes", False), ("turning_eyes", True)):
+        masked = []
+        for _, frames in moving_pieces(follow):
+            regions = _regions(frames, horn_schunck, head)
+            found = [_overlap(frame, region) for frame, region in zip(frames, regions, strict=True)][_SETTLED:]
+            masked.append(float(np.median(found)))
+        rows.append(Row(f"tracker.moving_target.photographs_20_deg_s.{name}_iou", float(np.mean(masked)), "IoU"))
+        say(f"moving target, photographs, {name}")
+    return rows
 
 
 def _nothing(regions: list[MovingRegion | None]) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.photos_data import NoPhotographsError, pair_names, pair_of, photographs_rig, targets
 from bench.trackers_scenes import FRAME_S, REQUEST_FRAME, Frame
@@ -16,7 +17,9 @@ from vergence_rig.rig import Rig
 from vergence_sim.optics import Lens
 from vergence_sim.photo.views import PhotoEye
 
-__all__ = ["NoPhotographsError", "photograph_rig", "sequences", "standing"]
+__all__ = ["NoPhotographsError", "photograph_rig", "sensed", "sequences", "spread", "standing"]
+
+Image = NDArray[np.uint8]
 
 _PAIRS_USED, _STANDING = 12, 10
 _SACCADE, _REST, _SWEEP = 4, 12, 40  # pairs
@@ -34,17 +37,26 @@ def photograph_rig() -> Rig:
 
 def sequences(count: int = _PAIRS_USED) -> Iterator[tuple[str, list[Frame]]]:
     """Yield name and frames for one point of each of `count` pairs. Raises NoPhotographsError without photographs."""
-    for number, name in _spread(count):
+    for number, name in spread(count):
         yield name, list(_frames(name, number, range(REQUEST_FRAME + 1 + _SACCADE + _REST + _SWEEP)))
 
 
 def standing(count: int = _PAIRS_USED) -> Iterator[tuple[str, list[Frame]]]:
     """Yield name and frames as `sequences`, of eyes that stand still."""
-    for number, name in _spread(count):
+    for number, name in spread(count):
         yield name, list(_frames(name, number, [REQUEST_FRAME + _SACCADE] * _STANDING))
 
 
-def _spread(count: int) -> Iterator[tuple[int, str]]:
+def sensed(view: Image, rng: np.random.Generator) -> tuple[Image, Image]:
+    """Return what a sensor makes of a view (h, w, 3) BGR: grey (h, w) and colour, with the same noise."""
+    grey = cv2.cvtColor(view, cv2.COLOR_BGR2GRAY).astype(np.float32)
+    noise = _NOISE * rng.standard_normal(grey.shape, np.float32)
+    noisy = (np.clip(np.rint(one), 0, 255).astype(np.uint8) for one in (grey + noise, view + noise[:, :, None]))
+    return next(noisy), next(noisy)
+
+
+def spread(count: int) -> Iterator[tuple[int, str]]:
+    """Yield numbers and names of `count` of the pairs, spread over all."""
     names = pair_names()
     for number in range(count):
         yield number, names[number * len(names) // count]
@@ -72,11 +84,11 @@ def _frames(name: str, seed: int, poses: Iterable[int]) -> Iterator[Frame]:
         )
         off = landed * _LANDING_RAD
         reported = EyeAngles(true.pan_left_rad + off, true.pan_right_rad + off, true.tilt_rad - off)
-        images, places = [], []
+        images, colours, places = [], [], []
         for eye, pan_rad, ray in zip(eyes, (true.pan_left_rad, true.pan_right_rad), rays, strict=True):
-            grey = cv2.cvtColor(eye.view(pan_rad, true.tilt_rad), cv2.COLOR_BGR2GRAY).astype(np.float32)
-            noisy = grey + _NOISE * rng.standard_normal(grey.shape, np.float32)
-            images.append(np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
+            grey, colour = sensed(eye.view(pan_rad, true.tilt_rad), rng)
+            images.append(grey)
+            colours.append(colour)
             places.append(eye.project(ray, pan_rad, true.tilt_rad))
         x, y = places[0]
         square = np.array([(x + i * _HALF_PX, y + j * _HALF_PX) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
@@ -84,7 +96,7 @@ def _frames(name: str, seed: int, poses: Iterable[int]) -> Iterator[Frame]:
             k * FRAME_S,
             images[0],
             images[1],
-            (images[0], images[1]),
+            (colours[0], colours[1]),
             reported,
             places[0],
             places[1],

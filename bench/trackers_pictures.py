@@ -7,6 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.trackers_pasted import moving_pieces
+from bench.trackers_photographs import photograph_rig
 from bench.trackers_runs import model_of, run_tracker
 from bench.trackers_scenes import SCENES, Frame, rig, sequence
 from vergence_metric.disparity.cepstral import EchoWindow
@@ -14,6 +16,7 @@ from vergence_metric.tracking.anchored_cluster import AnchoredCluster
 from vergence_metric.tracking.moving_target import MovingTarget
 from vergence_metric.tracking.protocol import Tracker
 from vergence_metric.tracking.zero_disparity_pursuit import ZeroDisparityPursuit
+from vergence_rig.rig import Rig
 
 Picture = NDArray[np.uint8]
 
@@ -28,6 +31,8 @@ _PANELS = (
     ("zero_disparity", "rest", 20, "zero_disparity, at rest"),
     ("moving_target", "20_deg_s", 40, "moving_target, 20 deg/s"),
 )
+_ON_PHOTOGRAPHS = ("corner_cluster", "remembered_patch", "moving_target")
+_PIECE, _PIECE_FRAME = 4, 28  # of those that move across photographs
 
 
 def main() -> None:
@@ -36,16 +41,20 @@ def main() -> None:
     panels = []
     for kind, scene, number, title in _PANELS:
         frames = list(sequence(by_name[scene], "cube"))
-        panels.append(_titled(_panel(kind, frames, frames[number]), title))
+        panels.append(_titled(_panel(kind, frames, frames[number], rig()), title))
         if scene == "rest":
             cepstrum = frames[number]
     panels.append(_titled(_cepstrum(cepstrum), "cepstrum: the echo at its disparity"))
-    rows = [np.hstack(panels[k : k + 3]) for k in (0, 3)]
+    frames = [found for _, found in moving_pieces(follow=True)][_PIECE]
+    for kind in _ON_PHOTOGRAPHS:
+        picture = _panel(kind, frames, frames[_PIECE_FRAME], photograph_rig())
+        panels.append(_titled(picture, f"{kind}, photographs, 20 deg/s"))
+    rows = [np.hstack(panels[k : k + 3]) for k in range(0, len(panels), 3)]
     PATH.parent.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(PATH), np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, 88])
 
 
-def _panel(kind: str, frames: list[Frame], shown: Frame) -> Picture:
+def _panel(kind: str, frames: list[Frame], shown: Frame, head: Rig) -> Picture:
     picture = shown.colours[0].copy()
 
     def draw(frame: Frame, tracker: Tracker) -> None:
@@ -64,7 +73,7 @@ def _panel(kind: str, frames: list[Frame], shown: Frame) -> Picture:
             _tint(picture, mask.astype(bool), (0, 0))
 
     until = [frame for frame in frames if frame.stamp_s <= shown.stamp_s]
-    run, _ = run_tracker(kind, until, rig(), draw)
+    run, _ = run_tracker(kind, until, head, draw)
     cv2.circle(picture, _at(shown.left_px), 6, _TRUE, 1, cv2.LINE_AA)
     said = run.left_px[-1]
     if math.isfinite(said[0]):

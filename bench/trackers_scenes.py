@@ -34,7 +34,8 @@ SIDES_M = {
     "box": BOX_SIDES_M,
 }
 DISTANCE_M = 0.6
-_LAG_FRAMES = 2
+LAG_FRAMES = 2
+"""Pairs by which pursuit is late."""
 _REPORT_DELAY_S = 0.01
 _BIAS_RAD = (math.radians(0.2), math.radians(-0.15))
 _VISIBLE, _HIDDEN = 0.4, 0.1
@@ -174,9 +175,9 @@ class _Sequence:
                 simulator.place_object(name, place or _FAR_M)
             point = self._surface_point(pose)
             gazes.append(self._gaze(point, scene.rig_yaw_rad(t)))
-            eyes = gazes[max(k - _LAG_FRAMES, 0)] if scene.eyes == "follow" else gazes[0]
-            before = gazes[max(k - _LAG_FRAMES - 1, 0)] if scene.eyes == "follow" else gazes[0]
-            yield self._frame(t, pose, point, eyes, _reported(eyes, before))
+            eyes = gazes[max(k - LAG_FRAMES, 0)] if scene.eyes == "follow" else gazes[0]
+            before = gazes[max(k - LAG_FRAMES - 1, 0)] if scene.eyes == "follow" else gazes[0]
+            yield self._frame(t, pose, point, eyes, reported_angles(eyes, before))
 
     def _surface_point(self, pose: Pose) -> Array:
         return np.array(pose.center_m) + _yawed(pose.yaw_rad) @ self._on_target
@@ -216,8 +217,11 @@ def _yawed(yaw_rad: float) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _reported(eyes: EyeAngles, before: EyeAngles) -> EyeAngles:
-    """Return what the joints report: angles from a little earlier, off by a constant."""
+def reported_angles(eyes: EyeAngles, before: EyeAngles) -> EyeAngles:
+    """Return what the joints report: angles from a little earlier, off by a constant.
+
+    `before` are those of the pair before.
+    """
     late = _REPORT_DELAY_S / FRAME_S
     return EyeAngles(
         eyes.pan_left_rad + late * (before.pan_left_rad - eyes.pan_left_rad) + _BIAS_RAD[0],

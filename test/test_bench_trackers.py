@@ -5,12 +5,16 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from bench.photos_lockstep import Lockstep, clock_s
+from bench.trackers_boxes import run_given_boxes
+from bench.trackers_pasted import moving_pieces
+from bench.trackers_photographs import NoPhotographsError, photograph_rig
 from bench.trackers_runs import Run
-from bench.trackers_scenes import REQUEST_FRAME, SCENES, THINGS, Frame, Scene, sequence
+from bench.trackers_scenes import FRAME_S, REQUEST_FRAME, SCENES, THINGS, Frame, Scene, sequence
 from bench.trackers_scores import score, step_px
 from vergence_gaze.goals.goal import Goal, GoalKind, Result, TrackRequest
 from vergence_gaze.ros import gaze_messages
@@ -22,6 +26,7 @@ from vergence_sim.parameters import SimParameters
 from vergence_sim.renderer import RenderError
 from vergence_sim.simulator import Simulator
 
+CAMERA = CameraModel(photograph_rig().left_camera)
 BY_NAME = {scene.name: scene for scene in SCENES}
 
 
@@ -57,6 +62,33 @@ def test_what_covers_the_target_covers_it_in_the_truth_too() -> None:
     frame = frames_of(half, "cube")[0]
     assert not frame.hidden
     assert frame.visible
+
+
+@pytest.fixture(scope="module")
+def piece() -> list[Frame]:
+    try:
+        return next(moving_pieces(follow=True))[1]
+    except NoPhotographsError as error:
+        pytest.skip(str(error))
+
+
+def test_a_piece_of_a_photograph_moves_as_its_truth_says_and_keeps_its_disparity(piece: list[Frame]) -> None:
+    moving = piece[15:]
+    to_the_right = [CAMERA.angles([frame.left_px])[0][0] - frame.true_eyes.pan_left_rad for frame in moving]
+    assert np.diff(to_the_right) / FRAME_S == pytest.approx(-math.radians(20.0), rel=0.01)
+    for frame in moving:
+        assert frame.left_px[0] - frame.right_px[0] == pytest.approx(0.0, abs=0.5), "both eyes are late alike"
+    # What is seen at the place, less where the noise is, is the same in all images.
+    seen = [cv2.getRectSubPix(frame.left, (31, 31), frame.left_px).astype(float) for frame in moving]
+    assert all(np.corrcoef(seen[0].ravel(), one.ravel())[0, 1] > 0.9 for one in seen)
+
+
+def test_matching_inside_given_boxes_is_better_than_their_centres(piece: list[Frame]) -> None:
+    given = run_given_boxes(piece[:12], photograph_rig())
+    assert given.detected == 0.0, "no cube is in the photographs"
+    off = given.run.disparity_px - [frame.left_px[0] - frame.right_px[0] for frame in piece[REQUEST_FRAME:12]]
+    assert np.isfinite(given.run.left_px).all()
+    assert float(np.nanstd(off)) < given.centers_px
 
 
 @pytest.fixture(scope="module")

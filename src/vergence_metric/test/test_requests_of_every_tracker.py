@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from vergence_metric.disparity.semi_global import SemiGlobalEstimator
 from vergence_metric.testing.rendered_boards import Stage, gaze, true_pixel
 from vergence_metric.tracking import cluster_follower
 from vergence_metric.tracking.corner_cluster import CornerCluster
@@ -29,8 +30,8 @@ def stage(request):
     return Stage(request.param)
 
 
-def ask(stage, eyes, left_eye=True, goal_id=5):
-    pixel = true_pixel(PLACE, left_eye, eyes)
+def ask(stage, eyes, left_eye=True, goal_id=5, place=PLACE):
+    pixel = true_pixel(place, left_eye, eyes)
     request = TrackRequest(goal_id, stage.pair.stamp_s, left_eye, (float(pixel[0]), float(pixel[1])))
     stage.tracker.request(request, stage.pair)
 
@@ -121,6 +122,31 @@ def test_a_new_request_replaces_the_old_one(stage):
     for _ in range(8):
         free = stage.show(PLACE, gaze(PLACE))
     assert (free.status, free.goal_id) == (TrackStatus.OK, 0), free.reason
+
+
+def test_the_right_eye_sees_the_same_corners_after_a_saccade_across_and_up(monkeypatch):
+    cv2.setRNGSeed(1)
+    stage, high = Stage("corner_cluster"), PLACE + np.array([0.0, 0.0, 0.13])
+    middle = gaze(PLACE + np.array([0.0, 0.0, 0.06]))
+    stage.show(high, gaze(PLACE))
+    ask(stage, gaze(PLACE), place=high)
+    for eyes in (middle, gaze(high)):
+        track = stage.show(high, eyes)
+        assert track.status is TrackStatus.OCCLUDED
+        assert "saccade" in track.reason
+    searches = []
+    estimate_at = SemiGlobalEstimator.estimate_at
+
+    def counted(self, *arguments):
+        searches.append(arguments)
+        return estimate_at(self, *arguments)
+
+    monkeypatch.setattr(SemiGlobalEstimator, "estimate_at", counted)
+    for _ in range(5):
+        track = stage.show(high, gaze(high))
+    assert track.status is TrackStatus.OK, track.reason
+    assert abs(stage.errors[-1][2]) < 0.5
+    assert not searches
 
 
 @pytest.mark.parametrize(

@@ -61,14 +61,14 @@ def match_corners(
     shown = camera.project(corners.structure.points) - camera.origin_px + expected_px
     followed = (corners.misses == 0) & (not hidden)
     shown[followed] = view.pixels(corners.filters.angles[followed])
-    alike = corners.patches @ patches.T
-    offsets = found[None, :, :] - shown[:, None, :]
-    established = corners.established
-    common = common_motion(offsets[established][alike[established] >= _ALIKE], reach_px)
-    away = np.linalg.norm(offsets - common, axis=2)
+    alike = corners.patches @ patches.T >= _ALIKE
+    across, down = (found[:, axis] - shown[:, axis, None] for axis in (0, 1))
+    votes = alike & corners.established[:, None]
+    common = common_motion(np.column_stack([across[votes], down[votes]]), reach_px)
+    away = np.hypot(across - common[0], down - common[1])
     sigmas_px = _SIGMAS * corners.filters.sigma_rad * view.camera.fx_px
     gates = np.where(followed, np.clip(sigmas_px, _LEAST_GATE_PX, reach_px), 2.0 * _LEAST_GATE_PX)
-    away[(alike < _ALIKE) | (away > gates[:, None])] = np.inf
+    away[~alike | (away > gates[:, None])] = np.inf
     nearest = away.argmin(axis=1)
     # Of two that take the same corner the nearer one has it.
     mine = np.isfinite(away.min(axis=1)) & (away.argmin(axis=0)[nearest] == np.arange(len(corners)))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator
 from vergence_metric.tracking.affine_transfer import AffineCamera
 from vergence_metric.tracking.corner_association import MatchedCorners, match_corners
-from vergence_metric.tracking.corners import find_corners, match_right, patches_at
+from vergence_metric.tracking.corners import find_corners, match_right, patches_at, strongest_corner
 from vergence_metric.tracking.direction_filter import DirectionFilter
 from vergence_metric.tracking.eye_view import Pixel, Points
 from vergence_metric.tracking.known_corners import KnownCorners
@@ -80,6 +80,7 @@ class CornerCluster:
         self._depth = TargetDepth(disparity, pair, point, parameters)
         across, down = (disparity.horizontal_px, disparity.vertical_px) if self._depth.known else (0.0, 0.0)
         relief = max(self._depth.parallax_rad, _LEAST_PARALLAX_RAD) if self._depth.known else _LEAST_PARALLAX_RAD
+        self._down_px = down  # how much higher the fixed point is seen in the right eye
         right_px = np.array([point[0] - across, point[1] - down])
         self._cameras = (
             AffineCamera(np.eye(2, 3), np.array(point)),
@@ -90,6 +91,7 @@ class CornerCluster:
         self._point = DirectionFilter(pair.views[0].angles(np.array([point])), self._sigma_rad)
         self.corners = self._no_corners()
         found = find_corners(pair.left, point, self._half_px, _MOST, _APART_PX)
+        self._strongest = strongest_corner(pair.left, point, self._half_px)
         # The depth of the surface about the point, by how its disparity changes over the image; or it faces the eyes.
         slopes = np.zeros(2) if disparity.surface is None else disparity.surface.slopes[0] / relief
         self._plane = max((np.zeros(2), slopes), key=lambda plane: len(self._members(pair, found, plane)[0]))
@@ -119,7 +121,7 @@ class CornerCluster:
         window_px = round(self._half_px + reach_px)
         # What is around the target has corners too, and the more the farther it is searched.
         most = min(round(_MOST_FOUND * (window_px / self._half_px) ** 2), 3 * _MOST_FOUND)
-        found = find_corners(pair.left, (expected[0], expected[1]), window_px, most, _APART_PX - 2.0)
+        found = find_corners(pair.left, (expected[0], expected[1]), window_px, most, _APART_PX - 2.0, self._strongest)
         if not len(found):
             return "there are no corners where it is predicted"
         matched = match_corners(pair.left, left_view, found, self.corners, self._cameras[0], expected, reach_px, hidden)
@@ -133,7 +135,7 @@ class CornerCluster:
             # The servos are not where they report: what the right eye sees says nothing of the distance.
             right: _Right | str = _Right(reason=_IN_SACCADE)
         else:
-            right = self._right_eye(pair, matched.known[agree], matched.px[agree])
+            right = self._right_eye(pair, matched, agree)
         if isinstance(right, str):
             return right
         return self._located(pair, matched, agree, right, hidden)
@@ -143,24 +145,20 @@ class CornerCluster:
 
         While its distance is not known in that pair, the corners that are known are kept.
         """
-        left, right = self._cameras
-        left.move(np.array(place))
+        self._cameras[0].move(np.array(place))
         self._point.restart(np.array([0]), pair.views[0].angles(np.array([place])), np.zeros(2))
-        self._last_left_y = place[1]
         if motion.saccading:
             return self._fix(pair, _Right(reason=_IN_SACCADE), _RELOCKED)
         seen = self._depth.weigh(pair, place, self._estimator)
         if isinstance(seen, str):
             return self._fix(pair, _Right(reason=seen), _RELOCKED)
-        across, down = seen.horizontal_px, seen.vertical_px
-        self._depth.measured(pair, place, across, down)
-        right.move(left.origin_px - (across, down))
+        measured = self._measured(pair, place, seen.horizontal_px, seen.vertical_px, seen.sigma_px)
         known, self.corners = self.corners, self._no_corners()
         found = find_corners(pair.left, place, self._half_px, _MOST, _APART_PX)
         self._add_corners(pair, found, established=True)
         if len(self.corners) < _LEAST_AGAIN:
             self.corners = known
-        return self._fix(pair, _Right(across, down, seen.sigma_px), _RELOCKED)
+        return self._fix(pair, measured, _RELOCKED)
 
     def _no_corners(self) -> KnownCorners:
         return KnownCorners(self._sigma_rad, 0.5 * float(self._extent_px.max()))
@@ -191,41 +189,49 @@ class CornerCluster:
         agree[~counting] = camera.agrees(structure[~counting], depths[~counting], matched.px[~counting])
         return agree
 
-    def _right_eye(self, pair: StoredPair, known: NDArray[np.intp], seen_px: Points) -> _Right | str:
+    def _right_eye(self, pair: StoredPair, matched: MatchedCorners, agree: NDArray[np.bool_]) -> _Right | str:
         """Return what the right eye sees of the corners that agree; why they are another thing's if it shows that."""
+        known, seen_px, patches = matched.known[agree], matched.px[agree], matched.patches[agree]
         left, right = self._cameras
         place = (float(left.origin_px[0]), float(left.origin_px[1]))
-        if not self._depth.certain:
-            self._depth.weigh(pair, place, self._estimator)
+        weighed = None if self._depth.certain else self._depth.weigh(pair, place, self._estimator)
         expected_px = self._depth.expected_px(place, pair.views)
         if expected_px is None:
             return _Right(reason="it does not see there" if self._depth.known else "its distance is not known")
-        start = np.array([place[0] - expected_px, right.origin_px[1] + place[1] - self._last_left_y])
+        start = np.array([place[0] - expected_px, place[1] - self._down_px])
         structure = self.corners.structure
         guess = right.project(structure.points[known]) - right.origin_px + start
-        there, found = match_right(pair.left, pair.right, seen_px, guess, _ALIKE_RIGHT)
+        there, found = match_right(pair.left, pair.right, seen_px, guess, _ALIKE_RIGHT, patches)
         right.move(start)
         count = 0
         if found.sum() >= min(3, len(known)) and found.any():
             seen = known[found]
-            agree = right.fit(structure.points[seen], structure.depth_variance[seen], there[found])
-            count = int(agree.sum())
+            fits = right.fit(structure.points[seen], structure.depth_variance[seen], there[found])
+            count = int(fits.sum())
         across, down = (left.origin_px - right.origin_px).tolist()
         jump_px = self._parameters.disparity_jump_px
         if count >= max(2, len(known) / 3) and abs(across - expected_px) <= jump_px:
-            structure.observe(seen[agree], right, there[found][agree])
-            self._depth.measured(pair, place, across, down)
-            return _Right(across, down, math.hypot(left.sigma_px, right.sigma_px))
+            structure.observe(seen[fits], right, there[found][fits])
+            return self._measured(pair, place, across, down, math.hypot(left.sigma_px, right.sigma_px))
         right.move(start)
-        again = self._estimator.estimate(pair.left, pair.right, place, expected_px)
+        # A search about the expected disparity adds nothing to one over the whole range.
+        again = weighed or self._estimator.estimate(pair.left, pair.right, place, expected_px)
+        if isinstance(again, str):
+            return _Right(reason=again)
         if not again.ok:
             return _Right(reason=again.reason)
         few = len(known) < _SHARE_AGAIN * min(int(self.corners.established.sum()), _MOST)
         # Joints of hobby servos shift what is expected; what covers a target shows hardly any of its corners.
         if few and abs(again.horizontal_px - expected_px) > jump_px:
             return f"its disparity differs by {again.horizontal_px - expected_px:+.1f} px: occluded"
-        self._depth.measured(pair, place, again.horizontal_px, again.vertical_px)
-        return _Right(again.horizontal_px, again.vertical_px, again.sigma_px)
+        return self._measured(pair, place, again.horizontal_px, again.vertical_px, again.sigma_px)
+
+    def _measured(self, pair: StoredPair, place: Pixel, across_px: float, down_px: float, sigma_px: float) -> _Right:
+        """Use the disparities of the fixed point at a place of the left image as the target's."""
+        self._depth.measured(pair, place, across_px, down_px)
+        self._down_px = down_px
+        self._cameras[1].move(np.array([place[0] - across_px, place[1] - down_px]))
+        return _Right(across_px, down_px, sigma_px)
 
     def _located(
         self, pair: StoredPair, matched: MatchedCorners, agree: NDArray[np.bool_], right: _Right, hidden: bool
@@ -236,7 +242,6 @@ class CornerCluster:
             self._point.restart(np.array([0]), left_view.angles(origin[None]), np.zeros(2))
         else:
             self._point.update(np.array([0]), left_view.angles(origin[None]), self._eye_sigma_rad)
-        self._last_left_y = float(origin[1])
         angles = left_view.angles(matched.px)
         again = corners.misses[matched.known] > 0
         corners.filters.update(matched.known, angles, self._eye_sigma_rad)
@@ -262,15 +267,15 @@ class CornerCluster:
     def _add_corners(self, pair: StoredPair, found: Points, established: bool) -> None:
         """Add the corners (N, 2) of the left image that belong to the target and are new."""
         left, right = self._cameras
-        self._last_left_y = float(left.origin_px[1])
         room = _MOST - int(self.corners.visible.sum())
         center = left.origin_px + left.scale * self._aside_px
-        new = (np.abs(found - center) <= _MARGIN * left.scale * self._extent_px).all(axis=1)
+        found = found[(np.abs(found - center) <= _MARGIN * left.scale * self._extent_px).all(axis=1)]
         if len(self.corners):
             shown = left.project(self.corners.structure.points)
             near = np.concatenate([self.corners.px[self.corners.misses == 0], shown])
-            new &= np.linalg.norm(found[:, None] - near[None], axis=2).min(axis=1) >= _APART_PX
-        found, there = self._members(pair, found[new][:room], self._plane)
+            away = np.hypot(*(found[:, axis, None] - near[:, axis] for axis in (0, 1)))
+            found = found[away.min(axis=1) >= _APART_PX]
+        found, there = self._members(pair, found[:room], self._plane)
         if not len(found):
             return
         angles, rates = pair.views[0].angles(found), self._point.rates[0]

@@ -12,18 +12,29 @@ Points = NDArray[np.float64]
 Patches = NDArray[np.float32]
 
 _SIDE_PX = 9
-_QUALITY = 0.01
+_QUALITY = 0.01  # of the strongest corner in a target's own window: least strength of its corners
+_LEAST_QUALITY = 0.002  # of the strongest corner in any window
 _BLOCK_PX = 3
 _LEAST_CONTRAST = 3.0  # grey levels, standard deviation
 _AREA = _SIDE_PX * _SIDE_PX
 _ACROSS = np.arange(_SIDE_PX, dtype=np.float32) - (_SIDE_PX - 1) / 2
 
 
-def find_corners(image: Image, center_px: Pixel, half_px: int, most: int, apart_px: float) -> Points:
-    """Return up to `most` corners (N, 2) [px] of an image (h, w) in the square about a point, `apart_px` apart."""
+def find_corners(
+    image: Image, center_px: Pixel, half_px: int, most: int, apart_px: float, strongest: float = 0.0
+) -> Points:
+    """Return up to `most` corners (N, 2) [px] of an image (h, w) in the square about a point, `apart_px` apart.
+
+    Where a target has been learnt, `strongest` is the strength of its strongest corner: its others are found beside
+    stronger ones of what it passes.
+    """
     x0, y0 = round(center_px[0]) - half_px, round(center_px[1]) - half_px
     area = cut(image, x0, y0, 2 * half_px + 1, 2 * half_px + 1)
-    found = cv2.goodFeaturesToTrack(area, most, _QUALITY, apart_px, blockSize=_BLOCK_PX)
+    quality = _QUALITY
+    if strongest > 0.0:
+        here = max(strongest_corner(image, center_px, half_px), strongest)
+        quality = max(_QUALITY * strongest / here, _LEAST_QUALITY)
+    found = cv2.goodFeaturesToTrack(area, most, quality, apart_px, blockSize=_BLOCK_PX)
     if found is None:
         return np.empty((0, 2))
     corners = np.ascontiguousarray(np.asarray(found, np.float32).reshape(-1, 1, 2))
@@ -31,6 +42,13 @@ def find_corners(image: Image, center_px: Pixel, half_px: int, most: int, apart_
     moved = np.abs(refined - corners).max(axis=2) > 1.5  # it has left for another corner
     refined[moved] = corners[moved]
     return np.asarray(refined.reshape(-1, 2).astype(np.float64) + np.array([x0, y0]))
+
+
+def strongest_corner(image: Image, center_px: Pixel, half_px: int) -> float:
+    """Return the strength of the strongest corner of an image in the square about a point."""
+    side = 2 * half_px + 1
+    area = cut(image, round(center_px[0]) - half_px, round(center_px[1]) - half_px, side, side)
+    return float(cv2.cornerMinEigenVal(area, _BLOCK_PX).max())
 
 
 def patches_at(image: Image, points: Points) -> Patches:
@@ -51,10 +69,16 @@ def patches_at(image: Image, points: Points) -> Patches:
 
 
 def match_right(
-    left: Image, right: Image, points: Points, expected: Points, least_correlation: float
+    left: Image,
+    right: Image,
+    points: Points,
+    expected: Points,
+    least_correlation: float,
+    patches: Patches | None = None,
 ) -> tuple[Points, NDArray[np.bool_]]:
     """Return where corners (N, 2) of the left image are in the right one, and which were found (N,).
 
+    `patches` are those of the left image at the corners (`patches_at`), where they are known already.
     Lucas and Kanade's flow from the `expected` places (N, 2); it must return, and what is there must look alike.
     """
     if not len(points):
@@ -79,5 +103,6 @@ def match_right(
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
     places = there.reshape(-1, 2).astype(np.float64) + starts[1]
-    alike = np.einsum("ij,ij->i", patches_at(left, points), patches_at(right, places))
+    there_patches, here_patches = patches_at(right, places), patches_at(left, points) if patches is None else patches
+    alike = np.einsum("ij,ij->i", here_patches, there_patches)
     return places, (found.ravel() == 1) & (alike >= least_correlation)
