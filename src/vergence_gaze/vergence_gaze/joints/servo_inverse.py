@@ -2,7 +2,8 @@
 
 A hobby servo stops half its dead band short, on the side it came from, and its gears add half their play. Moving on in
 the same direction is exact, reversing first crosses the play. So the inverse overdrives by the half play in the
-direction of motion, and is slow to reverse: a joint that reversed at every noisy residual would never rest.
+direction of motion, and is slow to reverse: a joint that reversed at every noisy residual would never rest. Pans that
+are both let be may be off in vergence by as much as both together: the one that is farther off is judged by that.
 """
 
 import math
@@ -50,14 +51,18 @@ class ServoInverse:
             half_play_rad: half of each joint's play, as far as it is known.
         """
         command, desired, half_play = commanded_rad.tolist(), desired_rad.tolist(), half_play_rad.tolist()
-        for i, shaft in enumerate(shaft_rad.tolist()):
-            arriving = min(max(shaft, command[i] - half_play[i]), command[i] + half_play[i])
-            error = desired[i] - arriving
+        errors = [
+            want - min(max(shaft, sent - half), sent + half)
+            for want, shaft, sent, half in zip(desired, shaft_rad.tolist(), command, half_play, strict=True)
+        ]
+        farther = int(abs(errors[1]) > abs(errors[0]))
+        for i, error in enumerate(errors):
             if not math.isfinite(error):
                 continue
+            off = max(abs(error), abs(errors[1] - errors[0])) if i == farther else abs(error)
             direction = 1.0 if error > 0 else -1.0
             turning = direction != self._direction[i]
-            if abs(error) <= (self._turn_tolerance[i] if turning else self._tolerance[i]):
+            if off <= (self._turn_tolerance[i] if turning else self._tolerance[i]):
                 continue
             self._direction[i] = direction
             # A long way is overdriven in full; a short way back in part: an overestimated play must not overshoot.
