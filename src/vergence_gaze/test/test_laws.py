@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from vergence_gaze import law_registry
 from vergence_gaze.control.controller import GazeController
@@ -128,6 +130,26 @@ def test_two_laws_of_one_name_are_refused(registered: type[HoldingLaw]) -> None:
 
 def test_laws_are_made_by_name() -> None:
     assert [make_law(default_rig(), gaze_parameters({"law": law})).name for law in law_names()] == list(law_names())
+
+
+@given(
+    before=st.tuples(*[st.floats(-0.3, 0.3)] * 3),
+    wanted=st.tuples(*[st.floats(-0.3, 0.3)] * 3),
+    then=st.tuples(*[st.floats(-0.01, 0.01)] * 3),
+)
+def test_pans_that_are_let_be_leave_no_more_of_vergence_than_one_of_them_may(before, wanted, then):
+    """Wherever they come from: each may be off by what a small way back is left alone for, both together no more."""
+    inverse = ServoInverse(default_rig().with_servos(SG90), ServoParameters(hold_tolerance_rad=0.0008))
+    half_play = np.full(3, SG90.half_play_rad)
+    left_alone = 0.0008 + 2.0 * 0.17 * SG90.half_play_rad
+    shaft, command = np.array(before), np.array(before)
+    for place in (np.array(wanted), np.add(wanted, then)):
+        for _ in range(8):
+            command = inverse.command(place, shaft, command, half_play)
+            shaft = np.clip(shaft, command - half_play, command + half_play)
+    off = place - shaft
+    assert np.abs(off).max() <= left_alone + 1e-9
+    assert abs(off[1] - off[0]) <= left_alone + 1e-9
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
