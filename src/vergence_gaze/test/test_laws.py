@@ -137,7 +137,7 @@ def test_laws_are_made_by_name() -> None:
     wanted=st.tuples(*[st.floats(-0.3, 0.3)] * 3),
     then=st.tuples(*[st.floats(-0.01, 0.01)] * 3),
 )
-def test_pans_that_are_let_be_leave_no_more_of_vergence_than_one_of_them_may(before, wanted, then):
+def test_pans_that_stay_leave_no_more_of_vergence_than_one_of_them_may(before, wanted, then):
     """Wherever they come from: each may be off by what a small way back is left alone for, both together no more."""
     inverse = ServoInverse(default_rig().with_servos(SG90), ServoParameters(hold_tolerance_rad=0.0008))
     half_play = np.full(3, SG90.half_play_rad)

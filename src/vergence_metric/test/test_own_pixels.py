@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vergence_metric.tracking.eye_view import EyeView
-from vergence_metric.tracking.own_pixels import OwnSurface, own_pixels
+from vergence_metric.tracking.own_pixels import SurfaceMasks, own_pixels
 from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_rig.camera import CameraModel
 from vergence_rig.rig import default_rig
@@ -55,7 +55,7 @@ def test_at_the_rim_of_the_image_the_mask_ends_there(at):
 
 
 def test_a_surface_is_known_at_the_distances_of_its_request_alone():
-    surface = OwnSurface(seen(0), seen(OWN_PX, BEHIND_PX), AT, [(0.1, OWN_PX), (0.05, BEHIND_PX)], 0.013)
+    surface = SurfaceMasks(seen(0), seen(OWN_PX, BEHIND_PX), AT, [(0.1, OWN_PX), (0.05, BEHIND_PX)], 0.013)
     assert surface.mask(0.3, 1) is None
     own, behind = surface.mask(0.105, 1), surface.mask(0.05, 2)
     assert own is not None
@@ -68,7 +68,7 @@ def test_a_surface_is_known_at_the_distances_of_its_request_alone():
 def test_a_stick_is_found_where_its_background_has_moved_against_it():
     """The lens has moved aside: the stick is seen 6.5 px to the left by that, and the wall is not."""
     moved_px = round(CAMERA.fx_px * LENS_M / DISTANCE_M)
-    surface = OwnSurface(seen(0), seen(OWN_PX, BEHIND_PX), AT, [(0.1, OWN_PX)], 0.013)
+    surface = SurfaceMasks(seen(0), seen(OWN_PX, BEHIND_PX), AT, [(0.1, OWN_PX)], 0.013)
     patch = RememberedPatch(seen(0), EyeView(CAMERA, 0.0, 0.0), AT)
     view = EyeView(CAMERA, 0.0, 0.0, lens_m=(0.0, -LENS_M, 0.0))
     direction = view.direction_of(patch.direction, EyeView(CAMERA, 0.0, 0.0), DISTANCE_M)

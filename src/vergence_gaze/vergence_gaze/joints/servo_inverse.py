@@ -2,8 +2,8 @@
 
 A hobby servo stops half its dead band short, on the side it came from, and its gears add half their play. Moving on in
 the same direction is exact, reversing first crosses the play. So the inverse overdrives by the half play in the
-direction of motion, and is slow to reverse: a joint that reversed at every noisy residual would never rest. Pans that
-are both let be may be off in vergence by as much as both together: the one that is farther off is judged by that.
+direction of motion, and is slow to reverse: a joint that reversed at every noisy residual would never rest. Two pans
+that stay where they are may be off in vergence by as much as both together: the farther one is compared by that, too.
 """
 
 import math

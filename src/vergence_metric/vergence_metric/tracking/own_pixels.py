@@ -29,14 +29,14 @@ _LEAD = 0.1  # in correlation, over any other disparity: edges along the baselin
 _NOISE_VARIANCE = 4.0  # [grey levels^2]
 
 
-class OwnSurface:
-    """The surface of a point of a pair, at whichever of its possible distances the point turns out to be.
+class SurfaceMasks:
+    """Masks of the surface of a point of a pair, for each distance that the point may have.
 
     Args:
         left: (h, w) grey image.
         right: (h, w) grey image, aligned.
         at: pixel (x, y) of the left image.
-        distances: the possible ones as (parallax [rad], disparity [px]), the likeliest first.
+        distances: each as (parallax [rad], disparity [px]), the likeliest first.
         apart_rad: parallaxes that differ by less may be the same.
     """
 

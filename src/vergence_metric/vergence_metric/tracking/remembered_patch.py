@@ -45,7 +45,7 @@ _TAKEN = -99.0  # evidence where a place has been found already
 _NOISE = 0.002  # share of its variance that an image taken again does not explain
 
 Sides = tuple[int, int, int, int]
-Own = Callable[[int], "Image | None"]
+MaskAt = Callable[[int], "Image | None"]
 """The mask (h, w) of a point's own surface at a scale; None where it is not known."""
 
 
@@ -88,7 +88,7 @@ class RememberedPatch:
         reach_px: int,
         alone_below: float = NEVER,
         distance_m: float = math.inf,
-        own: Own | None = None,
+        own: MaskAt | None = None,
     ) -> PatchSighting | None:
         """Return where it is, expected within `reach_px` of `direction` (3,) in rig_base; None outside the image.
 
@@ -120,7 +120,7 @@ class RememberedPatch:
         return self._alone(image, view, expected, reach, prior, own) or sighting
 
     def _alone(
-        self, image: Image, view: EyeView, expected: Pixel, reach: int, prior: float, own: Own | None
+        self, image: Image, view: EyeView, expected: Pixel, reach: int, prior: float, own: MaskAt | None
     ) -> PatchSighting | None:
         """Return where the point itself is, whatever surrounds it now; None unless it is unmistakable.
 
@@ -155,7 +155,7 @@ class RememberedPatch:
         pixel: Pixel,
         reach_px: int,
         distance_m: float = math.inf,
-        own: Own | None = None,
+        own: MaskAt | None = None,
     ) -> tuple[PatchSighting, float]:
         """Return where the point itself is within `reach_px` of a pixel, and its similarity at that pixel.
 
@@ -171,7 +171,7 @@ class RememberedPatch:
         """Return where that is now which was far behind the point when the point was seen."""
         return view.pixel(self._view.direction_of(direction, view, distance_m))
 
-    def _template(self, image: Image, view: EyeView, at: Pixel, size: tuple[int, int], own: Own | None) -> Template:
+    def _template(self, image: Image, view: EyeView, at: Pixel, size: tuple[int, int], own: MaskAt | None) -> Template:
         """Return what must be seen about a pixel now, as far as both images reach, at a size (half side [px], scale).
 
         With `own` only the point's own surface counts.
@@ -208,7 +208,7 @@ class RememberedPatch:
         size: tuple[int, int],
         most: int,
         prior: float,
-        own: Own | None = None,
+        own: MaskAt | None = None,
     ) -> tuple[list[tuple[Pixel, float]], float]:
         """Return up to `most` places of the template of a size, the best first, with their correlation.
 

@@ -7,7 +7,7 @@ import numpy as np
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
 from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
-from vergence_metric.tracking.own_pixels import OwnSurface
+from vergence_metric.tracking.own_pixels import SurfaceMasks
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import NEVER, RememberedPatch
 from vergence_metric.tracking.request import StoredPair, TrackRequest
@@ -43,7 +43,7 @@ def requested_target(
         for angle, _ in parallax_shares(disparity, point, pair.views)
         if (px := disparity_of_parallax(angle, point, pair.views)) is not None
     ]
-    target.surface = OwnSurface(pair.left, pair.right, point, distances, parameters.depth_apart_rad)
+    target.masks = SurfaceMasks(pair.left, pair.right, point, distances, parameters.depth_apart_rad)
     return target
 
 

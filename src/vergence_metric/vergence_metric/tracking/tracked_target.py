@@ -10,7 +10,7 @@ import numpy as np
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel
-from vergence_metric.tracking.own_pixels import OwnSurface
+from vergence_metric.tracking.own_pixels import SurfaceMasks
 from vergence_metric.tracking.remembered_patch import RememberedPatch
 from vergence_metric.tracking.target_appearance import TargetAppearance
 
@@ -40,7 +40,7 @@ class Target:
     matched_vergence_rad: float = math.nan  # of the eyes by their joints, when last matched in the right eye
     parallax_rad: float = math.nan  # angle from the left eye's ray to the right eye's, in the plane of the baseline
     patch: RememberedPatch | None = None  # of a requested target
-    surface: OwnSurface | None = None  # of a requested target
+    masks: SurfaceMasks | None = None  # of a requested target
     depths: DepthHypotheses | None = None  # of a requested target
     found: bool = True  # since its request
     most_at_point: float = 0.0  # of a requested target: what noise leaves of the point's similarity with itself
@@ -58,10 +58,10 @@ class Target:
 
     def own(self, scale: int) -> Image | None:
         """Return the mask (h, w) of its own surface where it was seen at its request; None where it is not known."""
-        if self.surface is None or self.depths is None:
+        if self.masks is None or self.depths is None:
             return None
         # Parallaxes change by what the joints report wrongly, and may seem new: what counts is with which they began.
-        masks = (self.surface.mask(one.first_rad, scale) for one in self.depths.ranked)
+        masks = (self.masks.mask(one.first_rad, scale) for one in self.depths.ranked)
         return next((mask for mask in masks if mask is not None), None)
 
     def turn_to(self, views: tuple[EyeView, EyeView]) -> None:
