@@ -26,6 +26,7 @@ from vergence_metric.tracking.reduced import reduced
 _WIDE_HALF_PX, _WIDE_SCALE = 160, 4
 _WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context is looked for
 _WIDE_REACH_PX = 16  # that parallax may move the point beside it
+_OWN_REACH_PX = 8  # the same where the head's geometry says how far it does: the point's own pixels may be few
 _CONTEXT_HALF_PX, _CONTEXT_SCALE = 48, 2  # on photographs the smallest that rarely errs
 _POINT_HALF_PX = 16
 NEVER = -1.0
@@ -145,7 +146,7 @@ class RememberedPatch:
         if wide and wide[0][1] >= _WIDE_SIMILARITY:
             (x, y), _ = wide[0]
             there = (x + expected[0] - far[0], y + expected[1] - far[1])
-            return there, _WIDE_REACH_PX, _WIDE_PRIOR, spread_px
+            return there, _OWN_REACH_PX if _is_displaced(expected, far) else _WIDE_REACH_PX, _WIDE_PRIOR, spread_px
         return expected, reach, prior, spread_px
 
     def refine(
