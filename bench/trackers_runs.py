@@ -60,14 +60,14 @@ def _run_once(
     kind: str, frames: list[Frame], rig: Rig, on_pair: OnPair | None
 ) -> tuple[Run, dict[str, Run], list[float]]:
     """Return what `run_tracker` returns, without costs, and the CPU time of each pair after the request [s]."""
-    camera, parameters = CameraModel(rig.left_camera), DisparityParameters()
+    camera, kinematics, parameters = CameraModel(rig.left_camera), Kinematics(rig), DisparityParameters()
     estimator = SharedEstimate(make_estimator(parameters), parameters)
-    tracker: Tracker = make_tracker(TrackerParameters(kind=kind), estimator, camera, Kinematics(rig))
+    tracker: Tracker = make_tracker(TrackerParameters(kind=kind), estimator, camera, kinematics)
     places, disparities, naive, spent_s = [], [], _NaiveFixations(), []
     for number, frame in enumerate(frames):
         started = time.thread_time()
         if number == REQUEST_FRAME:
-            tracker.request(TrackRequest(1, frame.stamp_s, True, frame.left_px), stored(frame, camera, Kinematics(rig)))
+            tracker.request(TrackRequest(1, frame.stamp_s, True, frame.left_px), stored(frame, camera, kinematics))
         track = tracker.update(frame.left, frame.right, frame.stamp_s, frame.eyes)
         if number > REQUEST_FRAME:
             spent_s.append(time.thread_time() - started)

@@ -19,7 +19,7 @@ from vergence_metric.tracking.reduced import reduced
 Floats = NDArray[np.float32]
 
 HALF_PX = 50
-"""How far about the point its surface is told from others."""
+"""How far about the point its surface is separated from others: as far as a remembered patch compares them."""
 
 _WINDOW = (7, 7)
 _OWN_CORRELATION = 0.7
