@@ -32,7 +32,7 @@ def find_corners(
     area = cut(image, x0, y0, 2 * half_px + 1, 2 * half_px + 1)
     quality = _QUALITY
     if strongest > 0.0:
-        here = max(strongest_corner(image, center_px, half_px), strongest)
+        here = max(_strength(area), strongest)
         quality = max(_QUALITY * strongest / here, _LEAST_QUALITY)
     found = cv2.goodFeaturesToTrack(area, most, quality, apart_px, blockSize=_BLOCK_PX)
     if found is None:
@@ -48,6 +48,10 @@ def strongest_corner(image: Image, center_px: Pixel, half_px: int) -> float:
     """Return the strength of the strongest corner of an image in the square about a point."""
     side = 2 * half_px + 1
     area = cut(image, round(center_px[0]) - half_px, round(center_px[1]) - half_px, side, side)
+    return _strength(area)
+
+
+def _strength(area: Image) -> float:
     return float(cv2.cornerMinEigenVal(area, _BLOCK_PX).max())
 
 
