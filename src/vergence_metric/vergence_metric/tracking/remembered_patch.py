@@ -22,13 +22,13 @@ from vergence_metric.disparity.fovea_pair import cut
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.reduced import reduced
+from vergence_metric.tracking.surroundings import WIDE_HALF_PX, WIDE_SCALE
 
-_WIDE_HALF_PX, _WIDE_SCALE = 160, 4
 _WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context is looked for
 _WIDE_REACH_PX = 16  # that parallax may move the point beside it
 _OWN_REACH_PX = 8  # the same where the head's geometry says how far it does: the point's own pixels may be few
 _CONTEXT_HALF_PX, _CONTEXT_SCALE = 48, 2  # on photographs the smallest that rarely errs
-_POINT_HALF_PX = 16
+_POINT_HALF_PX, _NARROW_HALF_PX = 16, 6  # the latter where its background has moved, and may fill most of the former
 NEVER = -1.0
 """No correlation is below it."""
 _ALONE_LEAD = 0.3  # in correlation, over any other place: without its surroundings a point must be unmistakable
@@ -73,12 +73,15 @@ class PatchSighting:
 
 
 class RememberedPatch:
-    """What surrounds a pixel of one eye's image, (h, w) uint8, with the eye's view at that moment."""
+    """What surrounds a pixel of one eye's image, (h, w) uint8, with the eye's view at that moment.
 
-    def __init__(self, image: Image, view: EyeView, pixel: Pixel) -> None:
-        self._view = view
+    `surroundings_m` is how far away most of it is.
+    """
+
+    def __init__(self, image: Image, view: EyeView, pixel: Pixel, surroundings_m: float = math.inf) -> None:
+        self._view, self._surroundings_m = view, surroundings_m
         self.direction = view.direction(pixel)
-        self._levels = {scale: reduced(image, scale) for scale in (1, _CONTEXT_SCALE, _WIDE_SCALE)}
+        self._levels = {scale: reduced(image, scale) for scale in (1, _CONTEXT_SCALE, WIDE_SCALE)}
         self._reaches = _reaches(image, pixel)
 
     def find(
@@ -94,20 +97,20 @@ class RememberedPatch:
         """Return where it is, expected within `reach_px` of `direction` (3,) in rig_base; None outside the image.
 
         Where its surroundings are less similar than `alone_below`, the point itself counts if it is unmistakable.
-        `distance_m` is the point's: a lens off its axis has moved, and what is far away lies beside the point now.
+        `distance_m` is the point's: a lens off its axis has moved, and what is farther away lies beside the point now.
         Then only its own surface counts, as `own` returns its mask at a scale.
         """
         expected, height, width = view.pixel(direction), *image.shape
         if not (-reach_px <= expected[0] < width + reach_px and -reach_px <= expected[1] < height + reach_px):
             return None
         far = self._far(view, direction, distance_m)
-        own = own if _is_displaced(expected, far) else None
+        own, half_px = _counting(_is_displaced(expected, far), own)
         expected, reach, prior, wide_spread_px = self._about(image, view, expected, far, reach_px)
         size = (_CONTEXT_HALF_PX, _CONTEXT_SCALE)
         places, spread_px = self._places(image, view, expected, reach, size, _CANDIDATES, prior, own)
         if not places:
             return None
-        template = self._template(image, view, expected, (_POINT_HALF_PX, 1), own)
+        template = self._template(image, view, expected, (half_px, 1), own)
         found = []
         for place, similarity in places:
             pixel, at_point, _ = _best_near(image, template, place, _REFINED_WITHIN_PX)
@@ -138,11 +141,11 @@ class RememberedPatch:
     ) -> tuple[Pixel, int, float, float]:
         """Return where to search the point, how far and at which prior, by the wide view; the last is its spread.
 
-        The wide view is expected at `far`: most of it is much farther away than a point that is looked at.
+        The wide view is expected at `far`: most of it is at another distance than the point.
         """
         reach = max(reach_px, _WIDE_REACH_PX)
         prior = _PRIOR * (reach / max(reach_px, 1)) ** 2
-        wide, spread_px = self._places(image, view, far, reach, (_WIDE_HALF_PX, _WIDE_SCALE), 1, prior)
+        wide, spread_px = self._places(image, view, far, reach, (WIDE_HALF_PX, WIDE_SCALE), 1, prior)
         if wide and wide[0][1] >= _WIDE_SIMILARITY:
             (x, y), _ = wide[0]
             there = (x + expected[0] - far[0], y + expected[1] - far[1])
@@ -163,14 +166,15 @@ class RememberedPatch:
         Only its nearest surroundings count: those of a moving object change. `distance_m` and `own` are as in `find`.
         """
         far = self._far(view, view.direction(pixel), distance_m)
-        own = own if _is_displaced(pixel, far) else None
-        template = self._template(image, view, pixel, (_POINT_HALF_PX, 1), own)
+        own, half_px = _counting(_is_displaced(pixel, far), own)
+        template = self._template(image, view, pixel, (half_px, 1), own)
         place, similarity, here = _best_near(image, template, pixel, reach_px)
         return PatchSighting(place, similarity, similarity), here
 
     def _far(self, view: EyeView, direction: NDArray[np.float64], distance_m: float) -> Pixel:
-        """Return where that is now which was far behind the point when the point was seen."""
-        return view.pixel(self._view.direction_of(direction, view, distance_m))
+        """Return where that is now of the surroundings which was behind the point when the point was seen."""
+        seen = self._view.direction_of(direction, view, distance_m)
+        return view.pixel(view.direction_of(seen, self._view, self._surroundings_m))
 
     def _template(self, image: Image, view: EyeView, at: Pixel, size: tuple[int, int], own: MaskAt | None) -> Template:
         """Return what must be seen about a pixel now, as far as both images reach, at a size (half side [px], scale).
@@ -224,7 +228,7 @@ class RememberedPatch:
         area = cut(image, at[0] - left, at[1] - top, left + right + scale, top + bottom + scale)
         surface = _correlation(reduced(area, scale), template)
         evidence = _evidence(surface)
-        ranked = evidence - _cost(surface.shape, prior)
+        ranked = evidence - _cost(surface.shape, prior, scale)
         j, i = divmod(int(ranked.argmax()), ranked.shape[1])
         rows, columns = np.nonzero(evidence >= evidence[j, i] - _AS_ALIKE)
         spread_px = scale * float(np.hypot(rows - j, columns - i).max())
@@ -253,6 +257,14 @@ def _is_displaced(at: Pixel, far: Pixel) -> bool:
     return distance(at, far) > _SAME_PX
 
 
+def _counting(displaced: bool, own: MaskAt | None) -> tuple[MaskAt | None, int]:
+    """Return the mask of what counts, and how far about the point it does [px]: all, unless its background has moved."""
+    if not displaced:
+        return None, _POINT_HALF_PX
+    known = own is not None and own(1) is not None
+    return own, _POINT_HALF_PX if known else _NARROW_HALF_PX
+
+
 def _turned(mask: Image, warp: NDArray[np.float64], shape: tuple[int, ...]) -> Image | None:
     """Return the part of a mask that a template (h, w) is of; None where too little of that counts."""
     flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
@@ -262,9 +274,14 @@ def _turned(mask: Image, warp: NDArray[np.float64], shape: tuple[int, ...]) -> I
 
 
 @lru_cache(maxsize=32)
-def _cost(shape: tuple[int, ...], prior: float) -> NDArray[np.float32]:
-    """Return by how much each place of a search is worse for its distance from the middle: `prior` at the rim."""
-    down, across = (np.linspace(-1.0, 1.0, n, dtype=np.float32) ** 2 if n > 1 else np.zeros(1) for n in shape)
+def _cost(shape: tuple[int, ...], prior: float, scale: int = 1) -> NDArray[np.float32]:
+    """Return by how much each place of a search is worse for its distance from the middle: `prior` at the rim.
+
+    At a scale, the middle of the middle place is half of what it has been reduced by to the right of that and below.
+    """
+    half = 0.5 * (scale - 1) / scale
+    reaches = (max((n - 1) // 2, 1) for n in shape)
+    down, across = (((np.arange(n) - n // 2 + half) / reach) ** 2 for n, reach in zip(shape, reaches, strict=True))
     cost = np.asarray(np.float32(prior) * np.add.outer(down, across), np.float32)
     cost.flags.writeable = False
     return cost

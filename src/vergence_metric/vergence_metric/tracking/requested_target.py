@@ -1,10 +1,12 @@
 """A target that was asked for by its place in one image: learnt there, found again after the eyes have turned."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
-from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
+from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, Image
+from vergence_metric.tracking.depth_evidence import parallax_shares
 from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.own_pixels import SurfaceMasks
@@ -12,13 +14,19 @@ from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import NEVER, RememberedPatch
 from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.sighted import in_both_eyes, in_left_eye
+from vergence_metric.tracking.surroundings import surroundings_disparity
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
 from vergence_metric.tracking.track import Track, TrackStatus
-from vergence_metric.tracking.tracked_target import Target, disparity_of_parallax, parallax, vergence_of
+from vergence_metric.tracking.tracked_target import (
+    Target,
+    disparity_of_parallax,
+    distance_of_parallax,
+    parallax,
+    vergence_of,
+)
 
 USUAL_EXTENT_PX = (60.0, 60.0)
 _TURNED_PX = 2.0  # change of the vergence since the last match up to which the expected disparity is searched alone
-_SAME_PX = 2.0  # candidates this close to the answer are it
 _REST_PX, _MOVED_PX, _MOVED_SHARE = 4.0, 8.0, 0.3  # how far a visible target may be from where it is expected
 
 
@@ -31,48 +39,39 @@ def requested_target(
 ) -> Target:
     """Return the target of a request, as it is in the pair in which it was asked for, to be found in the next one."""
     point = request.pixel if request.left_eye else pixel_in_left_eye(request.pixel, pair, estimator)
-    patch = RememberedPatch(pair.left, pair.views[0], point)
+    patch = RememberedPatch(pair.left, pair.views[0], point, surroundings_m(pair, point))
     appearance = TargetAppearance(pair.left, point, request.extent_px or USUAL_EXTENT_PX)
     target = Target(track_id, pair.stamp_s, appearance, pair.stamp_s, pair.views, patch.direction, np.zeros(3), True)
     target.patch, target.goal_id, target.hidden, target.found = patch, request.goal_id, True, False
     target.depths = DepthHypotheses(parameters.depth_memory, parameters.depth_apart_rad, parameters.depth_share)
     disparity = estimator.estimate(pair.left, pair.right, point)
-    weigh_depths(target, target.depths, disparity, point, pair.views)
+    weigh_depths(target, target.depths, disparity, point, pair)
+    # Even where no match is sure: which one is the target's is known later.
+    may_be = [disparity.horizontal_px, *(one.disparity_px for one in disparity.candidates)]
     distances = [
-        (angle, px)
-        for angle, _ in parallax_shares(disparity, point, pair.views)
-        if (px := disparity_of_parallax(angle, point, pair.views)) is not None
+        (parallax(point, pair.views, (point[0] - px, point[1])), px) for px in may_be if math.isfinite(px)
     ]
     target.masks = SurfaceMasks(pair.left, pair.right, point, distances, parameters.depth_apart_rad)
     return target
 
 
+def surroundings_m(pair: StoredPair, left_px: Pixel) -> float:
+    """Return how far away most of what surrounds a point of a pair is [m]; inf where it cannot be known."""
+    disparity_px = surroundings_disparity(pair.left, pair.right, left_px)
+    if disparity_px is None:
+        return math.inf
+    angle = parallax(left_px, pair.views, (left_px[0] - disparity_px, left_px[1]))
+    return distance_of_parallax(angle, pair.views[0].direction(left_px), pair.views)
+
+
 def weigh_depths(
-    target: Target, depths: DepthHypotheses, disparity: Disparity, left_px: Pixel, views: tuple[EyeView, EyeView]
+    target: Target, depths: DepthHypotheses, disparity: Disparity, left_px: Pixel, pair: StoredPair
 ) -> bool:
     """Add what a pair says of the target's distance; returns whether it is the likeliest by now."""
-    answered = depths.update(parallax_shares(disparity, left_px, views))
+    answered = depths.update(parallax_shares(disparity, left_px, pair))
     if depths.best is not None:
         target.parallax_rad = depths.best.parallax_rad
     return answered is not None and answered is depths.best
-
-
-def parallax_shares(disparity: Disparity, left_px: Pixel, views: tuple[EyeView, EyeView]) -> list[tuple[float, float]]:
-    """Return the parallaxes [rad] that a pair gives a left pixel, the answer's first, and the probability of each.
-
-    The answer has its confidence as probability, the estimator's other candidates share the rest by their likelihood.
-    """
-    if disparity.status not in (DisparityStatus.OK, DisparityStatus.AMBIGUOUS):
-        return []
-    others = [c for c in disparity.candidates if abs(c.disparity_px - disparity.horizontal_px) > _SAME_PX]
-    sure, rest = disparity.confidence, sum(c.likelihood for c in others)
-    if disparity.status is DisparityStatus.AMBIGUOUS and rest > 0.0:
-        # Repetitions are as likely as what they repeat.
-        sure = min(sure, max(c.likelihood for c in disparity.candidates))
-    left_over = (1.0 - sure) / max(rest, 1.0 - sure, 1e-6)
-    seen = [(disparity.horizontal_px, sure), *((c.disparity_px, left_over * c.likelihood) for c in others)]
-    y = left_px[1] - disparity.vertical_px
-    return [(parallax(left_px, views, (left_px[0] - d, y)), share) for d, share in seen]
 
 
 def track_requested(
@@ -94,7 +93,7 @@ def track_requested(
     known = depths.certain and turned_px <= _TURNED_PX
     expected_px = target.expected_disparity(sighting.pixel, views) if known else None
     disparity = estimator.estimate(pair.left, pair.right, sighting.pixel, expected_px)
-    likeliest = weigh_depths(target, depths, disparity, sighting.pixel, views)
+    likeliest = weigh_depths(target, depths, disparity, sighting.pixel, pair)
     target.appearance.accept(pair.left, sighting, renew=disparity.ok)
     target.update_direction(pair.stamp_s, views[0].direction(sighting.pixel))
     track = in_left_eye(target, sighting, disparity.reason or "another distance is likelier")

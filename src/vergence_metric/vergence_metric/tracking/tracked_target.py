@@ -51,10 +51,7 @@ class Target:
     @property
     def distance_m(self) -> float:
         """From the left lens, by the parallax; inf where that is not known."""
-        if not self.parallax_rad > _LEAST_PARALLAX_RAD:
-            return math.inf
-        baseline_m = self.views[0].lens_m[1] - self.views[1].lens_m[1]
-        return baseline_m * math.cos(_across(self.direction) + self.parallax_rad) / math.sin(self.parallax_rad)
+        return distance_of_parallax(self.parallax_rad, self.direction, self.views)
 
     def own(self, scale: int) -> Image | None:
         """Return the mask (h, w) of its own surface where it was seen at its request; None where it is not known."""
@@ -144,6 +141,14 @@ def disparity_of_parallax(parallax_rad: float, left_px: Pixel, views: tuple[EyeV
     right = forward * math.cos(angle) + np.array([0.0, math.sin(angle), 0.0])
     x = views[1].pixel(right)[0]
     return left_px[0] - x if math.isfinite(x) else None
+
+
+def distance_of_parallax(parallax_rad: float, direction: np.ndarray, views: tuple[EyeView, EyeView]) -> float:
+    """Return how far from the left lens a parallax lies in a direction (3,) [m]; inf where that cannot be known."""
+    if not parallax_rad > _LEAST_PARALLAX_RAD:
+        return math.inf
+    baseline_m = views[0].lens_m[1] - views[1].lens_m[1]
+    return baseline_m * math.cos(_across(direction) + parallax_rad) / math.sin(parallax_rad)
 
 
 def parallax(left_px: Pixel, views: tuple[EyeView, EyeView], right_px: Pixel) -> float:
