@@ -142,7 +142,7 @@ class PairMetric:
         track = self._track(pair, edge, ideal[0])
         self._seen = _Seen(pair, ideal, edge, track)
         stamp_s = pair.left_stamp_ns * 1e-9
-        contrast = EdgeContrast(stamp_s, edge.least_contrast.contrast, math.nan)
+        contrast = EdgeContrast(stamp_s, edge.target_contrast(track.surface).contrast, math.nan)
         return [contrast, track_sighting(track, ideal, stamp_s, pair.skew_ns * 1e-9)]
 
     def measurement(self) -> Measurement | None:

@@ -13,6 +13,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +22,8 @@ from vergence_metric.edges.windows import Window
 from vergence_rig.verged import SMALL_WINDOWS_PX, best_small_window
 
 _FOVEAL_SIGMAS = 4.0  # a window this many times as wide as the foveal weight's deviation holds it
+_BORDER = np.ones((5, 5), np.uint8)  # edge pixels lie at the border of what they are edges of
+_FEWEST_EDGE_PIXELS = 30
 _LATTICE = 24  # points along a window's side that represent all its pixels
 
 
@@ -98,6 +101,41 @@ def foveal_contrast(field: OrientedField, truncation_px: int, sigma_px: float) -
         everywhere = field.mean_distances_px(1 - direction, truncation_px, _LATTICE)[window]
         figure = float(weight[inside] @ field.distances_px(direction, truncation_px)[inside])
         chance = float(of_bin @ everywhere)
+        ratios.append(figure / chance if chance > 0.0 else math.nan)
+    return (ratios[0] + ratios[1]) / 2.0
+
+
+def surface_contrast(
+    field: OrientedField, truncation_px: int, support: NDArray[np.float32], corner: tuple[int, int]
+) -> float:
+    """Return the contrast of the edge pixels on or at the border of a surface; NaN where there are too few.
+
+    A thing that fills little of every window has a contrast of its own, whatever is behind it.
+
+    Args:
+        field: the pair's edges.
+        truncation_px: where distances are cut off, at most the field's.
+        support: (h, w), 1 at the surface's pixels, else 0.
+        corner: (column, row) of the support's top left pixel, from the corner of the field's largest window.
+
+    """
+    window = field.windows[-1]
+    mask = np.zeros((window.height, window.width), np.float32)
+    x, y = corner
+    height, width = support.shape
+    inside = slice(max(y, 0), max(y + height, 0)), slice(max(x, 0), max(x + width, 0))
+    there = mask[inside]
+    there[:] = support[max(-y, 0) :, max(-x, 0) :][: there.shape[0], : there.shape[1]]
+    counts = np.asarray(cv2.dilate(mask, _BORDER)) > 0.0
+    ratios = []
+    for direction in (0, 1):
+        edges = field.images[direction]
+        on = counts[edges.row, edges.column]
+        if np.count_nonzero(on) < _FEWEST_EDGE_PIXELS:
+            return math.nan
+        everywhere = field.mean_distances_px(1 - direction, truncation_px, _LATTICE)[-1]
+        chance = float(np.bincount(edges.bin[on], minlength=field.bins) @ everywhere)
+        figure = float(field.distances_px(direction, truncation_px)[on].sum())
         ratios.append(figure / chance if chance > 0.0 else math.nan)
     return (ratios[0] + ratios[1]) / 2.0
 

@@ -1,9 +1,10 @@
 """The edge metric of a stereo pair in one call, for the node and `vergence measure`."""
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.alignment.alignment import Aligner, Alignment
 from vergence_metric.alignment.parameters import AlignmentParameters
+from vergence_metric.disparity.protocol import Surface
 from vergence_metric.edges.chance import ChanceLevels, chance_levels
 from vergence_metric.edges.contrast import (
     Contrasts,
@@ -20,6 +22,7 @@ from vergence_metric.edges.contrast import (
     foveal_contrast,
     least_contrast,
     small_windows,
+    surface_contrast,
 )
 from vergence_metric.edges.edge_distance import EdgeDistances, edge_distances
 from vergence_metric.edges.edges import Edges, Grey, ImageShapeError, detect_edges, detect_edges_within, to_grey
@@ -64,6 +67,20 @@ class EdgeMetricResult:
     edge_parameters: EdgeParameters
     contrast_parameters: ContrastParameters
     stage_s: dict[str, float]
+    small_field: OrientedField
+    small_origin_px: tuple[int, int]
+
+    def target_contrast(self, surface: Surface | None) -> WindowContrast:
+        """Return the least contrast of the small windows, or that of a target's surface where it is less.
+
+        Only until the next pair is measured.
+        """
+        least = self.least_contrast
+        if surface is None or not math.isfinite(least.contrast):
+            return least
+        corner = (surface.origin_px[0] - self.small_origin_px[0], surface.origin_px[1] - self.small_origin_px[1])
+        own = surface_contrast(self.small_field, self.contrast_parameters.truncation_px, surface.support, corner)
+        return replace(least, contrast=own) if own < least.contrast else least
 
     @cached_property
     def left_edges(self) -> Edges:
@@ -243,7 +260,17 @@ class EdgeMetric:
             foveal = foveal_contrast(oriented, p.truncation_px, p.foveal_sigma_px)
             least = least_contrast(oriented, p.truncation_px)
         return EdgeMetricResult(
-            windows, pair.alignment, pair.left_grey, pair.right_grey, foveal, least, self._edges, p, stage_s
+            windows,
+            pair.alignment,
+            pair.left_grey,
+            pair.right_grey,
+            foveal,
+            least,
+            self._edges,
+            p,
+            stage_s,
+            oriented,
+            (outer.left, outer.top),
         )
 
 

@@ -29,6 +29,7 @@ def track_message(
     `angular` and `images` are None without camera models.
     """
     height, width = result.left_grey.shape
+    contrast = result.target_contrast(track.surface)
     left_px, right_px = track.left_px, result.alignment.unaligned(*track.right_px, width, height)
     if images is not None:
         left_px, right_px = (_taken(image, px) for image, px in zip(images, (left_px, right_px), strict=True))
@@ -52,8 +53,8 @@ def track_message(
         reason=track.reason,
         candidate_disparity_px=[disparity_px for disparity_px, _ in track.candidates],
         candidate_weight=[weight for _, weight in track.candidates],
-        contrast_window_px=result.least_contrast.window_px,
-        contrast=result.least_contrast.contrast,
+        contrast_window_px=contrast.window_px,
+        contrast=contrast.contrast,
     )
 
 

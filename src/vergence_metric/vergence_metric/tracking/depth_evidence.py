@@ -38,4 +38,6 @@ def parallax_shares(disparity: Disparity, left_px: Pixel, pair: StoredPair) -> l
         contrast = np.array([contrast_if_verged(pair.left, pair.right, left_px, right_px) for right_px in at])
         weighed = shares * np.power(np.nan_to_num(contrast, nan=1.0) + _LEAST_CONTRAST, _CONTRAST_POWER)
         shares = weighed * shares.sum() / weighed.sum()
-    return [(parallax(left_px, pair.views, right_px), share) for right_px, share in zip(at, shares.tolist(), strict=True)]
+    return [
+        (parallax(left_px, pair.views, right_px), share) for right_px, share in zip(at, shares.tolist(), strict=True)
+    ]

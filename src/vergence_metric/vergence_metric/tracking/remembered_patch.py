@@ -10,8 +10,6 @@ Along an edge or without texture, where a level looks the same everywhere, the p
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -21,7 +19,8 @@ from vergence_metric.disparity.correlation import peak_offset
 from vergence_metric.disparity.fovea_pair import cut
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
-from vergence_metric.tracking.reduced import reduced
+from vergence_metric.tracking.patch_search import Template, best_near, correlation, distance_cost, evidence_of
+from vergence_metric.tracking.reduced import levelled
 from vergence_metric.tracking.surroundings import WIDE_HALF_PX, WIDE_SCALE
 
 _WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context is looked for
@@ -37,25 +36,14 @@ _APART_PX = 12.0  # two peaks of the context closer than this are one place
 _REFINED_WITHIN_PX = 4
 _LEAST_CONTRAST = 1.0  # standard deviation of a template [grey levels]
 _AS_ALIKE = 0.2  # difference in evidence below which two places look alike
-_PRIOR, _WIDE_PRIOR, _POINT_PRIOR = 0.3, 4.0, 1.0  # evidence by which a place at the rim of its search is worse
+_PRIOR, _WIDE_PRIOR = 0.3, 4.0  # evidence by which a place at the rim of its search is worse
 _SAME_PX = 2.0  # by which what is in front of or behind a surface may have moved against it, and still count
 _MOSTLY_OWN = 128  # of 255
 _LEAST_OWN_PX = 60
-_LARGEST_CORRELATION = 1.001  # a masked one is greater where nothing is seen
 _TAKEN = -99.0  # evidence where a place has been found already
-_NOISE = 0.002  # share of its variance that an image taken again does not explain
 
-Sides = tuple[int, int, int, int]
 MaskAt = Callable[[int], "Image | None"]
 """The mask (h, w) of a point's own surface at a scale; None where it is not known."""
-
-
-class Template(NamedTuple):
-    """What is looked for, (h, w) uint8, how far it reaches on each side [its px], and which of it counts, None: all."""
-
-    image: Image
-    mask: Image | None
-    sides: Sides
 
 
 @dataclass(frozen=True)
@@ -81,7 +69,7 @@ class RememberedPatch:
     def __init__(self, image: Image, view: EyeView, pixel: Pixel, surroundings_m: float = math.inf) -> None:
         self._view, self._surroundings_m = view, surroundings_m
         self.direction = view.direction(pixel)
-        self._levels = {scale: reduced(image, scale) for scale in (1, _CONTEXT_SCALE, WIDE_SCALE)}
+        self._levels = {scale: levelled(image, scale) for scale in (1, _CONTEXT_SCALE, WIDE_SCALE)}
         self._reaches = _reaches(image, pixel)
 
     def find(
@@ -113,9 +101,9 @@ class RememberedPatch:
         template = self._template(image, view, expected, (half_px, 1), own)
         found = []
         for place, similarity in places:
-            pixel, at_point, _ = _best_near(image, template, place, _REFINED_WITHIN_PX)
+            pixel, at_point, _ = best_near(image, template, place, _REFINED_WITHIN_PX)
             off = math.hypot(place[0] - expected[0], place[1] - expected[1]) / reach
-            evidence = float(_evidence(np.array([similarity, at_point], np.float32)).sum())
+            evidence = float(evidence_of(np.array([similarity, at_point], np.float32)).sum())
             found.append((evidence - prior * off**2, similarity, at_point, pixel))
         _, similarity, at_point, pixel = max(found)
         sighting = PatchSighting(pixel, similarity, at_point, min(spread_px, wide_spread_px))
@@ -168,7 +156,7 @@ class RememberedPatch:
         far = self._far(view, view.direction(pixel), distance_m)
         own, half_px = _counting(_is_displaced(pixel, far), own)
         template = self._template(image, view, pixel, (half_px, 1), own)
-        place, similarity, here = _best_near(image, template, pixel, reach_px)
+        place, similarity, here = best_near(image, template, pixel, reach_px)
         return PatchSighting(place, similarity, similarity), here
 
     def _far(self, view: EyeView, direction: NDArray[np.float64], distance_m: float) -> Pixel:
@@ -226,9 +214,9 @@ class RememberedPatch:
         at = (round(expected[0]), round(expected[1]))
         left, top, right, bottom = (scale * (side + reach) for side in template.sides)
         area = cut(image, at[0] - left, at[1] - top, left + right + scale, top + bottom + scale)
-        surface = _correlation(reduced(area, scale), template)
-        evidence = _evidence(surface)
-        ranked = evidence - _cost(surface.shape, prior, scale)
+        surface = correlation(levelled(area, scale), template)
+        evidence = evidence_of(surface)
+        ranked = evidence - distance_cost(surface.shape, prior, scale)
         j, i = divmod(int(ranked.argmax()), ranked.shape[1])
         rows, columns = np.nonzero(evidence >= evidence[j, i] - _AS_ALIKE)
         spread_px = scale * float(np.hypot(rows - j, columns - i).max())
@@ -258,7 +246,7 @@ def _is_displaced(at: Pixel, far: Pixel) -> bool:
 
 
 def _counting(displaced: bool, own: MaskAt | None) -> tuple[MaskAt | None, int]:
-    """Return the mask of what counts, and how far about the point it does [px]: all, unless its background has moved."""
+    """Return the mask of what counts and how far about the point [px]; None: all, unless its background has moved."""
     if not displaced:
         return None, _POINT_HALF_PX
     known = own is not None and own(1) is not None
@@ -271,46 +259,3 @@ def _turned(mask: Image, warp: NDArray[np.float64], shape: tuple[int, ...]) -> I
     turned = np.asarray(cv2.warpPerspective(mask, warp, shape[::-1], flags=flags))
     counts = turned >= _MOSTLY_OWN
     return np.where(counts, np.uint8(255), np.uint8(0)) if np.count_nonzero(counts) >= _LEAST_OWN_PX else None
-
-
-@lru_cache(maxsize=32)
-def _cost(shape: tuple[int, ...], prior: float, scale: int = 1) -> NDArray[np.float32]:
-    """Return by how much each place of a search is worse for its distance from the middle: `prior` at the rim.
-
-    At a scale, the middle of the middle place is half of what it has been reduced by to the right of that and below.
-    """
-    half = 0.5 * (scale - 1) / scale
-    reaches = (max((n - 1) // 2, 1) for n in shape)
-    down, across = (((np.arange(n) - n // 2 + half) / reach) ** 2 for n, reach in zip(shape, reaches, strict=True))
-    cost = np.asarray(np.float32(prior) * np.add.outer(down, across), np.float32)
-    cost.flags.writeable = False
-    return cost
-
-
-def _best_near(image: Image, template: Template, place: Pixel, reach: int) -> tuple[Pixel, float, float]:
-    """Return the sub-pixel place within reach where the template fits best, its correlation, and that at `place`.
-
-    Of places that fit alike the nearest counts.
-    """
-    (left, top, _, _), (height, width) = template.sides, template.image.shape
-    x0, y0 = round(place[0]) - left - reach, round(place[1]) - top - reach
-    area = cut(image, x0, y0, width + 2 * reach, height + 2 * reach)
-    surface = _correlation(area, template)
-    nearest = _evidence(surface) - _cost(surface.shape, _POINT_PRIOR)
-    j, i = divmod(int(nearest.argmax()), surface.shape[1])
-    di, dj = peak_offset(nearest, i, j)
-    return (x0 + left + i + di, y0 + top + j + dj), float(surface[j, i]), float(surface[reach, reach])
-
-
-def _evidence(similarity: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return how much correlations say for their places: a place that leaves half as much unexplained has 0.7 more."""
-    return np.asarray(-np.log(1.0 + _NOISE - similarity), np.float32)
-
-
-def _correlation(area: Image, template: Template) -> NDArray[np.float32]:
-    how = cv2.TM_CCOEFF_NORMED
-    surface = np.asarray(cv2.matchTemplate(area, template.image, how, mask=template.mask), np.float32)
-    usable = np.isfinite(surface) & (np.abs(surface) <= _LARGEST_CORRELATION)
-    if not usable.all():
-        surface[~usable] = -1.0
-    return surface

@@ -48,9 +48,7 @@ def requested_target(
     weigh_depths(target, target.depths, disparity, point, pair)
     # Even where no match is sure: which one is the target's is known later.
     may_be = [disparity.horizontal_px, *(one.disparity_px for one in disparity.candidates)]
-    distances = [
-        (parallax(point, pair.views, (point[0] - px, point[1])), px) for px in may_be if math.isfinite(px)
-    ]
+    distances = [(parallax(point, pair.views, (point[0] - px, point[1])), px) for px in may_be if math.isfinite(px)]
     target.masks = SurfaceMasks(pair.left, pair.right, point, distances, parameters.depth_apart_rad)
     return target
 

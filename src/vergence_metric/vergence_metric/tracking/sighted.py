@@ -49,4 +49,5 @@ def in_both_eyes(
         confidence=track.confidence / _CONFIDENCE_WITHOUT_DISPARITY * (1.0 if disparity.ok else _CONFIDENCE_REJECTED),
         status=TrackStatus.OK,
         reason="" if disparity.ok else disparity.reason,
+        surface=disparity.surface,
     )

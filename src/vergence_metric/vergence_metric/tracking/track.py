@@ -1,9 +1,10 @@
 """The state of the followed target in one pair; the fields of TargetTrack.msg."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
+from vergence_metric.disparity.protocol import Surface
 from vergence_metric.tracking.eye_view import Pixel
 
 NOWHERE: Pixel = (math.nan, math.nan)
@@ -29,6 +30,7 @@ class Track:
     the locked region at its present scale. `confidence` is the similarity to the target's appearance, lowered where the
     disparity could not be measured. `goal_id` is that of the request which the track answers, 0 for none.
     `candidates` are the disparities [px] that a requested target may have, likeliest first, each with its weight.
+    `surface` is what the point lies on, where it was measured.
     """
 
     track_id: int
@@ -44,6 +46,7 @@ class Track:
     reason: str
     goal_id: int = 0
     candidates: tuple[tuple[float, float], ...] = ()
+    surface: Surface | None = field(default=None, repr=False, compare=False)
 
     @classmethod
     def nowhere(cls, track_id: int, status: TrackStatus, reason: str, lock_stamp_s: float = math.nan) -> "Track":
