@@ -48,7 +48,7 @@ def test_the_distance_is_by_the_parallax():
     views = tuple(EyeView(CAMERA, 0.0, 0.0, lens_m=(0.0, y, 0.0)) for y in (BASELINE_M / 2, -BASELINE_M / 2))
     pair = StoredPair(0.0, seen(0, 0), seen(WALL_PX, 80), (views[0], views[1]))
     assert surroundings_m(pair, AT) == pytest.approx(WALL_M, rel=0.1)
-    assert surroundings_m(StoredPair(0.0, seen(0, 0), texture(9, 3.0)[:480, :640], pair.views), AT) == np.inf
+    assert surroundings_m(StoredPair(0.0, seen(0, 0), texture(9, 3.0)[:480, :640], pair.views), AT) is None
 
 
 @pytest.mark.parametrize(("surroundings_m", "right"), [(WALL_M, True), (np.inf, False)])

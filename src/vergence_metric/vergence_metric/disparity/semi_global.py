@@ -44,9 +44,11 @@ _FURTHEST_PX, _VAGUE_PX = 0.75, 0.12  # a fit further from the plane of its surf
 _LEAST_DEVIATIONS = -1.0  # below what chance gives, for the strip's smoothness speaks for a point too
 _SURE_DEVIATIONS = 0.5  # but a strip looks smooth whatever it shows: sure is only what does better than chance
 _LEAST_DEVIATIONS_FLAT = 1.0  # where only one window has texture: a wall's shading is smooth, and matches anywhere
+_ELSEWHERE_DEVIATIONS = -1.5  # that the tall window may reach in other places, where it decides alone
 _LEAST_CONFIDENCE = 0.3
 _UNSURE = 0.5  # confidence of what is more likely wrong than right, at most
 _MOST_REPEATED = 4
+_UPRIGHT_CONFIDENCE = 0.7  # of what the tall window alone sees: right wherever the truth was known, but seldom seen
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,11 @@ class PointMatching:
         repeated = self.repeated(best)
         sure = confidence(evidence)
         status, reason = self._status(best, evidence, sure, repeated)
+        if status is DisparityStatus.NO_MATCH and (upright := self._upright()) is not None:
+            evidence, horizontal, vertical, surface = self.measure(upright)
+            ranked = (Candidate(upright.disparity_px, _UPRIGHT_CONFIDENCE, upright.found_by), *self._ranked(best, []))
+            sure, status = _UPRIGHT_CONFIDENCE, DisparityStatus.OK
+            return Disparity(horizontal, vertical, sigma_px(evidence), sure, status, "", name, point, ranked, surface)
         if status is not DisparityStatus.OK or not self.beyond_chance(best, evidence, _SURE_DEVIATIONS):
             sure = min(sure, _UNSURE)
         ranked = self._ranked(best, repeated)
@@ -152,6 +159,19 @@ class PointMatching:
         slopes = np.array([[own.slope_x, own.slope_y], [0.0, 0.0]]) if fit is None else np.eye(2) - fit.affine
         surface = Surface(slopes, own.support.grey, (round(own.support.x0), round(own.support.y0)))
         return evidence, *self._kept(own, fit), surface
+
+    def _upright(self) -> Choice | None:
+        """Return the candidate of the tall window where that fits in one place of the whole range, and nearly nowhere
+        else: a thin upright thing before a background that the strip takes its pixels for. None if there is no such.
+        """
+        peaks = [] if self._expected_px is not None or not self._column.textured else self._column.peaks.tolist()
+        if not peaks or self._column.deviations(peaks[0]) < 0.0:
+            return None
+        others = (self._column.deviations(d) for d in peaks[1:] if abs(d - peaks[0]) > 2.0 * _SAME_PX)
+        if max(others, default=-math.inf) > _ELSEWHERE_DEVIATIONS:
+            return None
+        support = self._support(float(peaks[0]), self._fine.about(*self._at, _NEAR_PX))
+        return Choice(float(peaks[0]), "tall window alone", support, choice_score(support))
 
     def repeated(self, choice: Choice) -> list[float]:
         """Return the disparities that a repeated texture makes as good as this candidate's."""

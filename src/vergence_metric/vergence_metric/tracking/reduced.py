@@ -20,13 +20,13 @@ def reduced(image: Image, scale: int) -> Image:
 
 
 def levelled(image: Image, scale: int) -> Image:
-    """Return the image (h, w) reduced by a scale beyond 1 so that every part has the same contrast.
+    """Return an image (h, w) that was reduced by a scale with every part at the same contrast; at scale 1 as it is.
 
     What is dim counts as much as what is bright then: along a bright pole a place is known by the dark room beside it.
     """
     if scale == 1:
         return image
-    values = reduced(image, scale).astype(np.float32)
+    values = image.astype(np.float32)
     mean = cv2.blur(values, _ABOUT)
     variance = np.maximum(cv2.blur(values * values, _ABOUT) - mean * mean, 0.0)
     even = _MIDDLE + _DEVIATION * (values - mean) / np.sqrt(variance + _NOISE_VARIANCE)

@@ -20,7 +20,7 @@ from vergence_metric.disparity.fovea_pair import cut
 from vergence_metric.disparity.protocol import Image
 from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.patch_search import Template, best_near, correlation, distance_cost, evidence_of
-from vergence_metric.tracking.reduced import levelled
+from vergence_metric.tracking.reduced import levelled, reduced
 from vergence_metric.tracking.surroundings import WIDE_HALF_PX, WIDE_SCALE
 
 _WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context is looked for
@@ -63,13 +63,14 @@ class PatchSighting:
 class RememberedPatch:
     """What surrounds a pixel of one eye's image, (h, w) uint8, with the eye's view at that moment.
 
-    `surroundings_m` is how far away most of it is.
+    `surroundings_m` is how far away most of it is, None where that is not known yet.
     """
 
-    def __init__(self, image: Image, view: EyeView, pixel: Pixel, surroundings_m: float = math.inf) -> None:
-        self._view, self._surroundings_m = view, surroundings_m
+    def __init__(self, image: Image, view: EyeView, pixel: Pixel, surroundings_m: float | None = None) -> None:
+        self._view, self.surroundings_m = view, surroundings_m
         self.direction = view.direction(pixel)
-        self._levels = {scale: levelled(image, scale) for scale in (1, _CONTEXT_SCALE, WIDE_SCALE)}
+        self._levels = {scale: reduced(image, scale) for scale in (1, _CONTEXT_SCALE, WIDE_SCALE)}
+        self._levelled = {scale: levelled(level, scale) for scale, level in self._levels.items()}
         self._reaches = _reaches(image, pixel)
 
     def find(
@@ -84,7 +85,8 @@ class RememberedPatch:
     ) -> PatchSighting | None:
         """Return where it is, expected within `reach_px` of `direction` (3,) in rig_base; None outside the image.
 
-        Where its surroundings are less similar than `alone_below`, the point itself counts if it is unmistakable.
+        Where its surroundings, or what lies there at the point, are less similar than `alone_below`, the point itself
+        counts if it is unmistakable.
         `distance_m` is the point's: a lens off its axis has moved, and what is farther away lies beside the point now.
         Then only its own surface counts, as `own` returns its mask at a scale.
         """
@@ -107,7 +109,7 @@ class RememberedPatch:
             found.append((evidence - prior * off**2, similarity, at_point, pixel))
         _, similarity, at_point, pixel = max(found)
         sighting = PatchSighting(pixel, similarity, at_point, min(spread_px, wide_spread_px))
-        if similarity >= alone_below:
+        if min(similarity, at_point) >= alone_below:
             return sighting
         return self._alone(image, view, expected, reach, prior, own) or sighting
 
@@ -162,12 +164,13 @@ class RememberedPatch:
     def _far(self, view: EyeView, direction: NDArray[np.float64], distance_m: float) -> Pixel:
         """Return where that is now of the surroundings which was behind the point when the point was seen."""
         seen = self._view.direction_of(direction, view, distance_m)
-        return view.pixel(view.direction_of(seen, self._view, self._surroundings_m))
+        distance_m = math.inf if self.surroundings_m is None else self.surroundings_m
+        return view.pixel(view.direction_of(seen, self._view, distance_m))
 
     def _template(self, image: Image, view: EyeView, at: Pixel, size: tuple[int, int], own: MaskAt | None) -> Template:
         """Return what must be seen about a pixel now, as far as both images reach, at a size (half side [px], scale).
 
-        With `own` only the point's own surface counts.
+        With `own` only the point's own surface counts, and images are not levelled by what lies beside it.
         """
         half_px, scale = size
         now = _reaches(image, at)
@@ -182,7 +185,7 @@ class RememberedPatch:
         source = (np.array(then) - middle + place - 0.5 * (scale - 1)) / scale
         warp = cv2.getPerspectiveTransform(corners + np.array([left, top], np.float32), source.astype(np.float32))
         template = cv2.warpPerspective(
-            self._levels[scale],
+            (self._levelled if own is None else self._levels)[scale],
             warp,
             (left + right + 1, top + bottom + 1),
             flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
@@ -214,7 +217,8 @@ class RememberedPatch:
         at = (round(expected[0]), round(expected[1]))
         left, top, right, bottom = (scale * (side + reach) for side in template.sides)
         area = cut(image, at[0] - left, at[1] - top, left + right + scale, top + bottom + scale)
-        surface = correlation(levelled(area, scale), template)
+        there = reduced(area, scale)
+        surface = correlation(levelled(there, scale) if own is None else there, template)
         evidence = evidence_of(surface)
         ranked = evidence - distance_cost(surface.shape, prior, scale)
         j, i = divmod(int(ranked.argmax()), ranked.shape[1])

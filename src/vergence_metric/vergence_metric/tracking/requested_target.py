@@ -53,11 +53,11 @@ def requested_target(
     return target
 
 
-def surroundings_m(pair: StoredPair, left_px: Pixel) -> float:
-    """Return how far away most of what surrounds a point of a pair is [m]; inf where it cannot be known."""
+def surroundings_m(pair: StoredPair, left_px: Pixel) -> float | None:
+    """Return how far away most of what surrounds a point of a pair is [m]; None where that cannot be seen."""
     disparity_px = surroundings_disparity(pair.left, pair.right, left_px)
     if disparity_px is None:
-        return math.inf
+        return None
     angle = parallax(left_px, pair.views, (left_px[0] - disparity_px, left_px[1]))
     return distance_of_parallax(angle, pair.views[0].direction(left_px), pair.views)
 
@@ -85,6 +85,8 @@ def track_requested(
     It is AMBIGUOUS while no distance is certain, or while places farther than `largest_spread_px` look as much like it.
     """
     views = pair.views
+    if target.patch is not None and target.patch.surroundings_m is None:
+        target.patch.surroundings_m = surroundings_m(pair, sighting.pixel)
     # Hobby servos do not turn by what they report: after a move in depth a search about what is expected would find the
     # next repetition of a texture there.
     turned_px = abs(vergence_of(views) - target.matched_vergence_rad) * views[0].camera.fx_px

@@ -50,7 +50,9 @@ class Target:
 
     @property
     def distance_m(self) -> float:
-        """From the left lens, by the parallax; inf where that is not known."""
+        """From the left lens, by the parallax; that of its surroundings where it is not known, inf without either."""
+        if math.isnan(self.parallax_rad) and self.patch is not None and self.patch.surroundings_m is not None:
+            return self.patch.surroundings_m
         return distance_of_parallax(self.parallax_rad, self.direction, self.views)
 
     def own(self, scale: int) -> Image | None:
