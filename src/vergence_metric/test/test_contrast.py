@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vergence_metric.edges.contrast import contrasts, foveal_contrast
+from vergence_metric.edges.contrast import contrasts, foveal_contrast, surface_contrast
 from vergence_metric.edges.edges import Edges, detect_edges
 from vergence_metric.edges.oriented_edges import OrientedField, oriented_field
 from vergence_metric.edges.parameters import EdgeParameters
@@ -154,3 +154,35 @@ def test_what_the_planes_cannot_hold_is_refused(bins: int, truncation: int) -> N
     edges = edges_of(picture(1))
     with pytest.raises(ValueError, match=f"got {truncation} and {bins}"):
         field(edges, edges, (50,), truncation, bins)
+
+
+def verged_strip(off_px: int) -> OrientedField:
+    """Return the edges of views with an upright strip 6 px wide in the middle, its surroundings 20 px off."""
+    near, far = picture(11), picture(12)
+    left, right = far[:, 40:240].copy(), far[:, 60:260].copy()
+    left[:, 97:103] = near[:, 40:46]
+    right[:, 97 - off_px : 103 - off_px] = near[:, 40:46]
+    return field(edges_of(left), edges_of(right), (50, 100))
+
+
+def test_a_thing_that_fills_little_of_every_window_has_a_contrast_of_its_own() -> None:
+    support = np.zeros((80, 20), np.float32)
+    support[:, 7:13] = 1.0
+    corner = (50 - 10, 50 - 40)  # the window's corner is (50, 50) of the image, the strip's middle its (100, 100)
+    verged, beside = verged_strip(0), verged_strip(9)
+    assert contrasts(verged, 5).both.min() > 0.7
+    assert surface_contrast(verged, 5, support, corner) < 0.6
+    assert surface_contrast(beside, 5, support, corner) > 0.8
+
+
+@pytest.mark.parametrize("corner", [(-500, 0), (0, 900), (90, 90)])
+def test_a_surface_with_few_edge_pixels_in_the_window_has_no_contrast(corner: tuple[int, int]) -> None:
+    support = np.ones((80, 20), np.float32)
+    support[:10, :10] = 0.0
+    assert np.isnan(surface_contrast(verged_strip(0), 5, support, corner))
+
+
+def test_a_surface_that_fills_the_window_has_its_contrast() -> None:
+    support = np.ones((300, 300), np.float32)
+    seen = verged_strip(0)
+    assert surface_contrast(seen, 5, support, (-100, -100)) == pytest.approx(contrasts(seen, 5).both[1], abs=1e-6)

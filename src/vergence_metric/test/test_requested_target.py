@@ -326,3 +326,53 @@ def test_a_point_without_texture_stays_where_its_surroundings_are():
         left, right = with_noise(flat, 2 * i + 1), with_noise(flat, 2 * i + 2)
         track = tracker.update(left, right, i * FRAME_S, AHEAD)
         np.testing.assert_allclose(track.left_px, (320.0, 240.0), atol=2.0)
+
+
+def test_along_an_edge_the_place_stays_where_it_is_expected_pair_after_pair():
+    """What is reduced has no place exactly at the expected one: half a place too far a pair adds up."""
+    bars = np.tile(texture(6, (1, 640), sigmas=(3.0, 9.0)), (480, 1))
+    eye = EyeView(CAMERA, 0.0, 0.0)
+    patch = RememberedPatch(with_noise(bars, 0), eye, (320.0, 240.0))
+    direction = patch.direction
+    for pair in range(1, 25):
+        found = patch.find(with_noise(bars, pair), eye, direction, 4)
+        assert found is not None
+        direction = eye.direction(found.pixel)
+    np.testing.assert_allclose(found.pixel, (320.0, 240.0), atol=3.0)
+
+
+def test_along_a_bright_pole_the_place_is_known_by_the_dark_room_beside_it():
+    room = 14.0 + 3.0 * (texture(8, (600, 640), sigmas=(6.0,)) - 128.0) / 45.0
+
+    def seen(down_px, seed):
+        image = room[60 - down_px : 540 - down_px].copy()
+        for row in range(480):
+            first = round(300.0 + 0.12 * (row - down_px))
+            image[row, first : first + 40] = 235.0
+        return with_noise(image, seed)
+
+    eye = EyeView(CAMERA, 0.0, 0.0)
+    patch = RememberedPatch(seen(0, 1), eye, (340.0, 240.0))
+    found = patch.find(seen(14, 2), eye, patch.direction, 24)
+    assert found is not None
+    np.testing.assert_allclose(found.pixel, (340.0, 254.0), atol=2.0)
+
+
+@pytest.mark.parametrize("moved", [(9, 9), (12, -6), (-14, 3)])
+def test_what_stands_before_surroundings_that_are_found_is_looked_for_by_itself(moved):
+    """A lens that lies off its axis has moved: the board is no longer where its surroundings are."""
+    wall, board = texture(11, (480, 640)), texture(50, (41, 33))
+
+    def seen(across_px, down_px, seed):
+        image = wall.copy()
+        image[220 + down_px : 261 + down_px, 304 + across_px : 337 + across_px] = board
+        return with_noise(image, seed)
+
+    eye = EyeView(CAMERA, 0.0, 0.0)
+    patch = RememberedPatch(seen(0, 0, 1), eye, (320.0, 240.0))
+    found = patch.find(seen(*moved, 2), eye, patch.direction, 24, alone_below=0.6)
+    assert found is not None
+    np.testing.assert_allclose(found.pixel, (320.0 + moved[0], 240.0 + moved[1]), atol=1.0)
+    lost = patch.find(with_noise(wall, 3), eye, patch.direction, 24, alone_below=0.6)
+    assert lost is not None
+    assert lost.at_point < 0.5

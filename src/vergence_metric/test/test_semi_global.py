@@ -298,6 +298,22 @@ def test_the_tall_window_sees_the_rod_where_square_ones_see_the_background():
     assert square.at(0.0) > square.at(40.0)
 
 
+@pytest.mark.parametrize(("width_px", "seed"), [(4, 8), (4, 11), (5, 5), (5, 11)])
+def test_where_the_strip_takes_a_rod_for_its_background_the_tall_window_decides_alone(width_px, seed):
+    found = estimate(*rod(width_px, 40, 0, seed))
+    assert found.ok
+    assert found.horizontal_px == pytest.approx(40.0, abs=2.0)
+    assert found.candidates[0].found_by == "tall window alone"
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_tall_window_does_not_decide_where_images_are_unrelated(seed):
+    left, _ = rod(5, 40, 0, seed)
+    found = estimate(left, view(texture(90 + seed), noise_seed=seed))
+    assert not found.ok
+    assert all(one.found_by != "tall window alone" for one in found.candidates)
+
+
 def test_own_pixels_decide_where_they_fit_and_match_back():
     assert EVIDENCE.own_pixels_decide
     for worse in ({"fit_correlation": 0.5}, {"own_share": 0.05}, {"back_px": 8.0}, {"fit_sigma_px": math.nan}):

@@ -119,10 +119,7 @@ class PointMatching:
         sure = confidence(evidence)
         status, reason = self._status(best, evidence, sure, repeated)
         if status is DisparityStatus.NO_MATCH and (upright := self._upright()) is not None:
-            evidence, horizontal, vertical, surface = self.measure(upright)
-            ranked = (Candidate(upright.disparity_px, _UPRIGHT_CONFIDENCE, upright.found_by), *self._ranked(best, []))
-            sure, status = _UPRIGHT_CONFIDENCE, DisparityStatus.OK
-            return Disparity(horizontal, vertical, sigma_px(evidence), sure, status, "", name, point, ranked, surface)
+            return self._alone(upright, self._ranked(best, []), name)
         if status is not DisparityStatus.OK or not self.beyond_chance(best, evidence, _SURE_DEVIATIONS):
             sure = min(sure, _UNSURE)
         ranked = self._ranked(best, repeated)
@@ -160,9 +157,19 @@ class PointMatching:
         surface = Surface(slopes, own.support.grey, (round(own.support.x0), round(own.support.y0)))
         return evidence, *self._kept(own, fit), surface
 
+    def _alone(self, choice: Choice, others: tuple[Candidate, ...], name: str) -> Disparity:
+        """Return the answer that the tall window gives by itself, before the other candidates."""
+        evidence, horizontal, vertical, surface = self.measure(choice)
+        d, sure = choice.disparity_px, _UPRIGHT_CONFIDENCE
+        ranked = (Candidate(d, sure, choice.found_by), *(one for one in others if abs(one.disparity_px - d) > _SAME_PX))
+        sigma, status, point = sigma_px(evidence), DisparityStatus.OK, self._pair.point_px
+        return Disparity(horizontal, vertical, sigma, sure, status, "", name, point, ranked, surface)
+
     def _upright(self) -> Choice | None:
-        """Return the candidate of the tall window where that fits in one place of the whole range, and nearly nowhere
-        else: a thin upright thing before a background that the strip takes its pixels for. None if there is no such.
+        """Return the candidate of the tall window where that fits in one place and nearly nowhere else, else None.
+
+        It is a thin upright thing before a background, with which the strip has filled its pixels. In all of the range:
+        about an expected disparity there is no elsewhere.
         """
         peaks = [] if self._expected_px is not None or not self._column.textured else self._column.peaks.tolist()
         if not peaks or self._column.deviations(peaks[0]) < 0.0:
