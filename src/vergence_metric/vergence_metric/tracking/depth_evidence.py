@@ -13,7 +13,8 @@ from vergence_metric.tracking.request import StoredPair
 from vergence_metric.tracking.tracked_target import parallax
 
 _SAME_PX = 2.0  # candidates this close to the answer are it
-_CONTRAST_POWER, _LEAST_CONTRAST = -5.0, 0.05  # of the probability of a repetition; fitted on half of the photographs
+CONTRAST_POWER, LEAST_CONTRAST = -3.0, 0.05
+"""Of the probability of a repetition; `bench/photos_repetitions.py` shows how they are chosen."""
 
 
 def parallax_shares(disparity: Disparity, left_px: Pixel, pair: StoredPair) -> list[tuple[float, float]]:
@@ -36,7 +37,7 @@ def parallax_shares(disparity: Disparity, left_px: Pixel, pair: StoredPair) -> l
     shares = np.array([share for _, share in seen])
     if repeated:
         contrast = np.array([contrast_if_verged(pair.left, pair.right, left_px, right_px) for right_px in at])
-        weighed = shares * np.power(np.nan_to_num(contrast, nan=1.0) + _LEAST_CONTRAST, _CONTRAST_POWER)
+        weighed = shares * np.power(np.nan_to_num(contrast, nan=1.0) + LEAST_CONTRAST, CONTRAST_POWER)
         shares = weighed * shares.sum() / weighed.sum()
     return [
         (parallax(left_px, pair.views, right_px), share) for right_px, share in zip(at, shares.tolist(), strict=True)
