@@ -63,8 +63,7 @@ def detect_edges(grey: Grey, parameters: EdgeParameters) -> Edges:
     """
     blurred = _blurred(grey, parameters)
     gradient_x, gradient_y = _gradients(blurred)
-    samples = gradient_x[::_SAMPLING, ::_SAMPLING], gradient_y[::_SAMPLING, ::_SAMPLING]
-    return _canny(gradient_x, gradient_y, _thresholds(*samples, parameters))
+    return _canny(gradient_x, gradient_y, _thresholds(gradient_x, gradient_y, parameters))
 
 
 def detect_edges_within(grey: Grey, parameters: EdgeParameters, area: tuple[slice, slice], scratch: Scratch) -> Edges:
@@ -75,14 +74,10 @@ def detect_edges_within(grey: Grey, parameters: EdgeParameters, area: tuple[slic
     the next image.
     """
     blurred = _blurred(grey, parameters, scratch.array("blurred", grey.shape, np.uint8))
-    rows, columns = area
-    top, left = max(rows.start - 1, 0), max(columns.start - 1, 0)
-    around = blurred[top : rows.stop + 1, left : columns.stop + 1]
-    buffers = scratch.array("gradient x", around.shape, np.int16), scratch.array("gradient y", around.shape, np.int16)
-    inside = slice(rows.start - top, rows.stop - top), slice(columns.start - left, columns.stop - left)
-    gradient_x, gradient_y = (gradient[inside] for gradient in _gradients(around, buffers))
-    thresholds = _thresholds(*_sampled_gradients(blurred, scratch), parameters)
-    return _canny(gradient_x, gradient_y, thresholds)
+    buffers = (scratch.array(f"gradient {axis}", grey.shape, np.int16) for axis in "xy")
+    gradient_x, gradient_y = _gradients(blurred, *buffers)
+    thresholds = _thresholds(gradient_x, gradient_y, parameters)
+    return _canny(gradient_x[area], gradient_y[area], thresholds)
 
 
 def _blurred(grey: Grey, parameters: EdgeParameters, buffer: Grey | None = None) -> Grey:
@@ -94,36 +89,25 @@ def _blurred(grey: Grey, parameters: EdgeParameters, buffer: Grey | None = None)
 
 
 def _gradients(
-    blurred: Grey, buffers: tuple[Gradient | None, Gradient | None] = (None, None)
+    blurred: Grey, buffer_x: Gradient | None = None, buffer_y: Gradient | None = None
 ) -> tuple[Gradient, Gradient]:
     """Return both Sobel derivatives, in the buffers if there are any."""
-    gradient_x, gradient_y = cv2.spatialGradient(blurred, *buffers, borderType=cv2.BORDER_REPLICATE)
+    gradient_x, gradient_y = cv2.spatialGradient(blurred, buffer_x, buffer_y, borderType=cv2.BORDER_REPLICATE)
     return np.asarray(gradient_x, np.int16), np.asarray(gradient_y, np.int16)
 
 
-def _sampled_gradients(blurred: Grey, scratch: Scratch) -> tuple[Gradient, Gradient]:
-    """Return both Sobel derivatives of every 4th row and column, without those between."""
-    height, width = blurred.shape
-    bordered = scratch.array("bordered", (height + 2, width + 2), np.uint8)
-    cv2.copyMakeBorder(blurred, 1, 1, 1, 1, cv2.BORDER_REPLICATE, dst=bordered)
-    rows, columns = ([slice(i, i + n, _SAMPLING) for i in range(3)] for n in (height, width))
-    above, here, below = ([bordered[row, column].astype(np.int16) for column in columns] for row in rows)
-    gradient_x = above[2] - above[0] + 2 * (here[2] - here[0]) + below[2] - below[0]
-    gradient_y = below[0] - above[0] + 2 * (below[1] - above[1]) + below[2] - above[2]
-    return gradient_x, gradient_y
-
-
 def _thresholds(gradient_x: Gradient, gradient_y: Gradient, parameters: EdgeParameters) -> tuple[float, float]:
-    """Return Canny's lower and upper threshold for an image with these derivatives at samples [grey levels].
+    """Return Canny's lower and upper threshold for an image with these derivatives [grey levels].
 
     Automatic ones: the upper threshold is the gradient (|dx| + |dy|, Canny's own measure) that a share
-    `auto_edge_share` of the samples exceeds, so that a change of exposure or gain scales it as it scales the gradients;
+    `auto_edge_share` of samples exceeds, so that a change of exposure or gain scales it as it scales the gradients;
     it never falls below `auto_floor`.
     """
     if parameters.threshold_mode == "fixed":
         return parameters.canny_low, parameters.canny_high
-    magnitude = np.abs(gradient_x)  # no more than 1020, as Sobel's of a byte image: counting is faster than sorting
-    magnitude += np.abs(gradient_y)
+    samples_x, samples_y = (gradient[::_SAMPLING, ::_SAMPLING] for gradient in (gradient_x, gradient_y))
+    # No more than 1020, as Sobel's of a byte image: counting is faster than sorting.
+    magnitude = np.abs(samples_x) + np.abs(samples_y)
     rank = round((1.0 - parameters.auto_edge_share) * (magnitude.size - 1))
     ranked = np.searchsorted(np.bincount(magnitude.ravel()).cumsum(), rank, side="right")
     high = max(float(ranked), parameters.auto_floor)
