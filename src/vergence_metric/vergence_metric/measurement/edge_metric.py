@@ -51,15 +51,14 @@ class EdgeMetricResult:
 
     `left_grey` and `right_grey` (h, w) uint8 are the images compared, the right one aligned. Arrays carry
     the names of vergence_msgs/EdgeVergence; values are float64, NaN where `status` (WindowStatus) gives a reason. Only
-    `foveal_contrast`, which is weighted by a Gaussian about the centre, and `least_contrast` of the small windows are
-    measured at once; the arrays are measured when they are read. `stage_s` is the duration of each stage so far [s].
+    `least_contrast`, that of the small windows, is measured at once; everything else is measured when it is read.
+    `stage_s` is the duration of each stage so far [s].
     """
 
     windows: tuple[Window, ...]
     alignment: Alignment
     left_grey: Grey
     right_grey: Grey
-    foveal_contrast: float
     least_contrast: WindowContrast
     edge_parameters: EdgeParameters
     contrast_parameters: ContrastParameters
@@ -131,6 +130,12 @@ class EdgeMetricResult:
     def contrast(self) -> Values:
         """Mean of both directions' contrasts."""
         return self._contrasts.both[self._rank]
+
+    @property
+    def foveal_contrast(self) -> float:
+        """Contrast at the fovea: edge pixels weigh less with their distance from the centre, by a Gaussian."""
+        p = self.contrast_parameters
+        return foveal_contrast(self._oriented, p.truncation_px, p.foveal_sigma_px)
 
     @property
     def robust_left_to_right_px(self) -> Values:
@@ -225,7 +230,7 @@ class EdgeMetric:
         p, stage_s = self._contrast, dict(pair.stage_s)
         height, width = pair.left_grey.shape
         windows = centre_windows(self._edges.windows_px, height, width, seen_px)
-        small = small_windows(windows, p.foveal_sigma_px)
+        small = small_windows(windows)
         outer = hull(small)
         area = (
             slice(max(outer.top - _EDGE_REACH_PX, 0), min(outer.bottom + _EDGE_REACH_PX, height)),
@@ -240,10 +245,9 @@ class EdgeMetric:
         with _timed(stage_s, "contrast"):
             there = [window.shifted(area[0].start, area[1].start) for window in small]
             oriented = _oriented_field(left, right, there, p, p.truncation_px, scratch[0])
-            foveal = foveal_contrast(oriented, p.truncation_px, p.foveal_sigma_px)
             least = least_contrast(oriented, p.truncation_px)
         return EdgeMetricResult(
-            windows, pair.alignment, pair.left_grey, pair.right_grey, foveal, least, self._edges, p, stage_s
+            windows, pair.alignment, pair.left_grey, pair.right_grey, least, self._edges, p, stage_s
         )
 
 
