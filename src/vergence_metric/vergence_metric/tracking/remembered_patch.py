@@ -78,6 +78,7 @@ class RememberedPatch:
     def __init__(self, image: Image, view: EyeView, pixel: Pixel) -> None:
         self._view = view
         self.direction = view.direction(pixel)
+        self._place = np.array(view.pixel(self.direction))
         self._levels = {scale: reduced(image, scale) for scale in (1, _CONTEXT_SCALE, _WIDE_SCALE)}
         self._reaches = _reaches(image, pixel)
 
@@ -186,8 +187,7 @@ class RememberedPatch:
         turned = view.direction(at)
         middle = np.array(self._view.pixel(turned))
         then = [self._view.pixel(view.direction((at[0] + scale * x, at[1] + scale * y))) for x, y in corners]
-        place = np.array(self._view.pixel(self.direction))
-        source = (np.array(then) - middle + place - 0.5 * (scale - 1)) / scale
+        source = (np.array(then) - middle + self._place - 0.5 * (scale - 1)) / scale
         warp = cv2.getPerspectiveTransform(corners + np.array([left, top], np.float32), source.astype(np.float32))
         template = cv2.warpPerspective(
             self._levels[scale],
@@ -293,7 +293,6 @@ def _evidence(similarity: NDArray[np.float32]) -> NDArray[np.float32]:
 def _correlation(area: Image, template: Template) -> NDArray[np.float32]:
     how = cv2.TM_CCOEFF_NORMED
     surface = np.asarray(cv2.matchTemplate(area, template.image, how, mask=template.mask), np.float32)
-    usable = np.isfinite(surface) & (np.abs(surface) <= _LARGEST_CORRELATION)
-    if not usable.all():
-        surface[~usable] = -1.0
+    if template.mask is not None:
+        surface[~(np.abs(surface) <= _LARGEST_CORRELATION)] = -1.0  # or not finite
     return surface
