@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.edges.parameters import EdgeParameters
-from vergence_metric.edges.scratch import Scratch
 
 Grey = NDArray[np.uint8]
 Gradient = NDArray[np.int16]
+Thresholds = tuple[float, float]
+"""Canny's lower and upper one [grey levels]."""
 
 _SAMPLING = 4  # thresholds are taken from every 4th row and column
 
@@ -55,32 +56,18 @@ def to_grey(image: NDArray[Any]) -> Grey:
     raise ImageShapeError(f"image must be (h, w) grey or (h, w, 3) BGR: got shape {image.shape}")
 
 
-def detect_edges(grey: Grey, parameters: EdgeParameters) -> Edges:
-    """Return the edges of a (h, w) uint8 `grey` image.
+def detect_edges(grey: Grey, parameters: EdgeParameters, thresholds: Thresholds | None = None) -> Edges:
+    """Return the edges of a (h, w) uint8 `grey` image, by its own thresholds if none are given.
 
     Canny thins the gradient to one pixel and follows edges from the upper down to the lower threshold. Raises
     ImageShapeError where `grey` is not a grey image.
     """
-    blurred = _blurred(grey, parameters)
-    gradient_x, gradient_y = _gradients(blurred)
-    return _canny(gradient_x, gradient_y, _thresholds(gradient_x, gradient_y, parameters))
+    gradient_x, gradient_y = gradients(blurred(grey, parameters))
+    return canny(gradient_x, gradient_y, thresholds or thresholds_of(gradient_x, gradient_y, parameters))
 
 
-def detect_edges_within(grey: Grey, parameters: EdgeParameters, area: tuple[slice, slice], scratch: Scratch) -> Edges:
-    """Return the edges in an area (rows, columns) of a (h, w) uint8 `grey` image; arrays are of the area's size.
-
-    They are those of `detect_edges` there, except at the area's border, and for weak ones that join a strong one
-    outside of the area only. The thresholds are the whole image's. The gradients are good until `scratch` is used for
-    the next image.
-    """
-    blurred = _blurred(grey, parameters, scratch.array("blurred", grey.shape, np.uint8))
-    buffers = (scratch.array(f"gradient {axis}", grey.shape, np.int16) for axis in "xy")
-    gradient_x, gradient_y = _gradients(blurred, *buffers)
-    thresholds = _thresholds(gradient_x, gradient_y, parameters)
-    return _canny(gradient_x[area], gradient_y[area], thresholds)
-
-
-def _blurred(grey: Grey, parameters: EdgeParameters, buffer: Grey | None = None) -> Grey:
+def blurred(grey: Grey, parameters: EdgeParameters, buffer: Grey | None = None) -> Grey:
+    """Return the (h, w) grey image blurred, in the buffer if there is one; raises ImageShapeError for another."""
     if grey.ndim != 2 or grey.dtype != np.uint8 or grey.size == 0:
         raise ImageShapeError(f"grey image must be (h, w) uint8 and not empty: got {grey.dtype} of shape {grey.shape}")
     if parameters.blur_sigma_px > 0.0:
@@ -88,15 +75,15 @@ def _blurred(grey: Grey, parameters: EdgeParameters, buffer: Grey | None = None)
     return grey
 
 
-def _gradients(
-    blurred: Grey, buffer_x: Gradient | None = None, buffer_y: Gradient | None = None
+def gradients(
+    image: Grey, buffer_x: Gradient | None = None, buffer_y: Gradient | None = None
 ) -> tuple[Gradient, Gradient]:
     """Return both Sobel derivatives, in the buffers if there are any."""
-    gradient_x, gradient_y = cv2.spatialGradient(blurred, buffer_x, buffer_y, borderType=cv2.BORDER_REPLICATE)
+    gradient_x, gradient_y = cv2.spatialGradient(image, buffer_x, buffer_y, borderType=cv2.BORDER_REPLICATE)
     return np.asarray(gradient_x, np.int16), np.asarray(gradient_y, np.int16)
 
 
-def _thresholds(gradient_x: Gradient, gradient_y: Gradient, parameters: EdgeParameters) -> tuple[float, float]:
+def thresholds_of(gradient_x: Gradient, gradient_y: Gradient, parameters: EdgeParameters) -> Thresholds:
     """Return Canny's lower and upper threshold for an image with these derivatives [grey levels].
 
     Automatic ones: the upper threshold is the gradient (|dx| + |dy|, Canny's own measure) that a share
@@ -114,6 +101,7 @@ def _thresholds(gradient_x: Gradient, gradient_y: Gradient, parameters: EdgePara
     return parameters.auto_low_ratio * high, high
 
 
-def _canny(gradient_x: Gradient, gradient_y: Gradient, thresholds: tuple[float, float]) -> Edges:
+def canny(gradient_x: Gradient, gradient_y: Gradient, thresholds: Thresholds) -> Edges:
+    """Return the edges of an image with these derivatives."""
     mask = cv2.Canny(gradient_x, gradient_y, *thresholds)
     return Edges(np.asarray(mask, np.uint8), gradient_x, gradient_y, *thresholds)

@@ -21,8 +21,9 @@ from vergence_metric.edges.contrast import (
     least_contrast,
     small_windows,
 )
+from vergence_metric.edges.edge_detector import EdgeDetector
 from vergence_metric.edges.edge_distance import EdgeDistances, edge_distances
-from vergence_metric.edges.edges import Edges, Grey, ImageShapeError, detect_edges, detect_edges_within, to_grey
+from vergence_metric.edges.edges import Edges, Grey, ImageShapeError, Thresholds, detect_edges, to_grey
 from vergence_metric.edges.nearest_edges import NearestEdges
 from vergence_metric.edges.oriented_edges import OrientedField, oriented_field
 from vergence_metric.edges.parameters import ContrastParameters, EdgeParameters
@@ -62,19 +63,20 @@ class EdgeMetricResult:
     least_contrast: WindowContrast
     edge_parameters: EdgeParameters
     contrast_parameters: ContrastParameters
+    thresholds: tuple[Thresholds, Thresholds]
     stage_s: dict[str, float]
 
     @cached_property
     def left_edges(self) -> Edges:
         """Edges of the whole left image."""
         with _timed(self.stage_s, "left_edges"):
-            return detect_edges(self.left_grey, self.edge_parameters)
+            return detect_edges(self.left_grey, self.edge_parameters, self.thresholds[0])
 
     @cached_property
     def right_edges(self) -> Edges:
         """Edges of the whole right image."""
         with _timed(self.stage_s, "right_edges"):
-            return detect_edges(self.right_grey, self.edge_parameters)
+            return detect_edges(self.right_grey, self.edge_parameters, self.thresholds[1])
 
     @property
     def windows_px(self) -> NDArray[np.uint32]:
@@ -185,7 +187,7 @@ class EdgeMetricResult:
 
 
 class EdgeMetric:
-    """Measures successive pairs, on one thread; its only state is the filtered alignment and reused memory."""
+    """Measures successive pairs, on one thread; its state is the alignment and the edges' thresholds."""
 
     def __init__(
         self,
@@ -197,7 +199,8 @@ class EdgeMetric:
         self._edges = edges or EdgeParameters()
         self._contrast = contrast or ContrastParameters()
         self._aligner = Aligner(alignment or AlignmentParameters())
-        self._scratch = (Scratch(), Scratch())  # one for each eye
+        self._detectors = (EdgeDetector(self._edges), EdgeDetector(self._edges))
+        self._scratch = Scratch()
 
     def measure(self, left: NDArray[Any], right: NDArray[Any], seen_px: int | None = None) -> EdgeMetricResult:
         """Measure a pair of (h, w, 3) BGR or (h, w) grey uint8 images of one size.
@@ -237,18 +240,16 @@ class EdgeMetric:
             slice(max(outer.left - _EDGE_REACH_PX, 0), min(outer.right + _EDGE_REACH_PX, width)),
         )
         with _timed(stage_s, "edges"):
-            scratch = self._scratch
+            images = (pair.left_grey, pair.right_grey)
             left, right = (
-                detect_edges_within(grey, self._edges, area, scratch[eye])
-                for eye, grey in enumerate((pair.left_grey, pair.right_grey))
+                detector.detect_within(grey, area) for detector, grey in zip(self._detectors, images, strict=True)
             )
         with _timed(stage_s, "contrast"):
             there = [window.shifted(area[0].start, area[1].start) for window in small]
-            oriented = _oriented_field(left, right, there, p, p.truncation_px, scratch[0])
+            oriented = _oriented_field(left, right, there, p, p.truncation_px, self._scratch)
             least = least_contrast(oriented, p.truncation_px)
-        return EdgeMetricResult(
-            windows, pair.alignment, pair.left_grey, pair.right_grey, least, self._edges, p, stage_s
-        )
+        thresholds = (left.low, left.high), (right.low, right.high)
+        return EdgeMetricResult(windows, pair.alignment, *images, least, self._edges, p, thresholds, stage_s)
 
 
 def _oriented_field(
