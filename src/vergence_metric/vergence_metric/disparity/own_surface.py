@@ -70,7 +70,7 @@ class _Surroundings:
 
     u: NDArray[np.float32]
     v: NDArray[np.float32]
-    tolerance: NDArray[np.float32]
+    tolerance: NDArray[np.floating]
     reach: int
     box: tuple[slice, slice]
     design: NDArray[np.float64]
