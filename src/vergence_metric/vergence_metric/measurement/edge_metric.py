@@ -53,7 +53,7 @@ class EdgeMetricResult:
     `left_grey` and `right_grey` (h, w) uint8 are the images compared, the right one aligned. Arrays carry
     the names of vergence_msgs/EdgeVergence; values are float64, NaN where `status` (WindowStatus) gives a reason. Only
     `least_contrast`, that of the small windows, is measured at once; everything else is measured when it is read.
-    `stage_s` is the duration of each stage so far [s].
+    `thresholds` are Canny's for the left and the right image, `stage_s` is the duration of each stage so far [s].
     """
 
     windows: tuple[Window, ...]
