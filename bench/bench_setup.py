@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 _LONGEST_S = 1200.0
 _LOOKED_EVERY_S = 0.1
 _WHEELS_FOUND = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
-"""Set by the ROS wheels in a process that finds their libraries; a child that has it looks for none of its own."""
+"""Set by the ROS wheels once their libraries can be found; with it a child process adds none, whatever its path."""
 
 
 class SetupError(RuntimeError):
