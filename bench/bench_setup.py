@@ -17,6 +17,8 @@ from bench.results import Row
 ROOT = Path(__file__).resolve().parents[1]
 _LONGEST_S = 1200.0
 _LOOKED_EVERY_S = 0.1
+_WHEELS_FOUND = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
+"""Set by the ROS wheels once their libraries can be found; with it a child process adds none, whatever its path."""
 
 
 class SetupError(RuntimeError):
@@ -64,28 +66,33 @@ def _checked(command: list[str], folder: Path) -> None:
 
 def _first_picture(clone: Path) -> None:
     """Start the demo and wait for the first picture that it writes."""
-    out = clone / "out" / "first"
-    demo = subprocess.Popen(
-        ["make", "demo", f"ARGS=--short --no-page --out {out}"],
-        cwd=clone,
-        env=_environment(),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    out, log = clone / "out" / "first", clone / "out" / "first.log"
+    log.parent.mkdir(exist_ok=True)
+    with log.open("w", encoding="utf-8") as output:
+        demo = subprocess.Popen(
+            ["make", "demo", f"ARGS=--short --no-page --out {out}"],
+            cwd=clone,
+            env=_environment(),
+            stdout=output,
+            stderr=output,
+            start_new_session=True,
+        )
     try:
         while not any(out.rglob("*.jpg")):
             if demo.poll() is not None:
-                raise SetupError(f"the demo ended with {demo.returncode} before its first picture")
+                printed = log.read_text(encoding="utf-8")[-2000:]
+                raise SetupError(f"the demo ended with {demo.returncode} before its first picture: {printed}")
             time.sleep(_LOOKED_EVERY_S)
     finally:
-        os.killpg(demo.pid, signal.SIGTERM)  # the demo ends its nodes
-        demo.wait(60.0)
+        if demo.poll() is None:
+            os.killpg(demo.pid, signal.SIGTERM)  # the demo ends its nodes
+            demo.wait(60.0)
 
 
 def _environment() -> dict[str, str]:
     """Return what a shell has in which this repository was not sourced."""
     own = str(ROOT)
     kept = {name: value for name, value in os.environ.items() if own not in value or name == "PATH"}
+    kept.pop(_WHEELS_FOUND, None)
     kept["PATH"] = os.pathsep.join(part for part in kept.get("PATH", "").split(os.pathsep) if not part.startswith(own))
     return kept

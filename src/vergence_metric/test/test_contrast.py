@@ -78,11 +78,12 @@ def test_distances_are_exact_for_any_edges(seed: int, share: float, truncation: 
     measured = field(left, right, (30, 64), truncation)
     points = measured.images[0]
     window = measured.windows[-1]
+    rows, columns = points.places
     for k in range(8):
         expected = distance_by_definition(right, k, 8, truncation)[window.slices]
         of_bin = points.bin == k
         found = measured.distances_px(0, truncation)[of_bin]
-        np.testing.assert_allclose(found, expected[points.row[of_bin], points.column[of_bin]], atol=1e-4)
+        np.testing.assert_allclose(found, expected[rows[of_bin], columns[of_bin]], atol=1e-4)
 
 
 def test_unrelated_images_read_about_one_and_alike_ones_zero() -> None:

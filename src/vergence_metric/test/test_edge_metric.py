@@ -137,6 +137,20 @@ def test_the_least_contrast_is_that_of_the_small_windows(windows_px: tuple[int, 
         assert math.isnan(found.least_contrast.contrast)
 
 
+def test_all_windows_of_a_pair_are_measured_with_the_same_thresholds() -> None:
+    metric, scene, random = EdgeMetric(alignment=AlignmentParameters(mode="none")), picture(5), np.random.default_rng(1)
+    left, right = scene[:480, 10:650], scene[:480, :640]
+    first = metric.measure(left, right)
+
+    def again(image: Grey) -> Grey:
+        return np.clip(image + random.normal(0.0, 3.0, image.shape), 0, 255).astype(np.uint8)
+
+    found = metric.measure(again(left), again(right))
+    assert found.thresholds == first.thresholds
+    assert (found.left_edges.high, found.right_edges.high) == (found.thresholds[0][1], found.thresholds[1][1])
+    assert found.least_contrast.contrast == pytest.approx(min(found.contrast[:3]), abs=0.01)
+
+
 def test_a_result_is_not_changed_by_the_next_pair() -> None:
     metric = EdgeMetric(alignment=AlignmentParameters(mode="none"))
     first = metric.measure(picture(1, 480, 640), picture(2, 480, 640))

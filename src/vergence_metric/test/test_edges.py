@@ -3,9 +3,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vergence_metric.edges.edges import ImageShapeError, detect_edges, detect_edges_within, to_grey
+from vergence_metric.edges.edges import ImageShapeError, detect_edges, to_grey
 from vergence_metric.edges.parameters import EdgeParameters
-from vergence_metric.edges.scratch import Scratch
 from vergence_rig.parameters import ParameterError
 
 AUTO = EdgeParameters()
@@ -90,16 +89,3 @@ def test_colour_is_refused_where_grey_is_meant() -> None:
 def test_parameters_that_cannot_be_are_named(name: str, value: object) -> None:
     with pytest.raises(ParameterError, match=name):
         EdgeParameters.from_mapping({name: value})
-
-
-@pytest.mark.parametrize("size", [(97, 130), (64, 64), (61, 83)])
-@pytest.mark.parametrize("parameters", [AUTO, EdgeParameters(blur_sigma_px=0.0), EdgeParameters(auto_edge_share=0.3)])
-def test_the_edges_of_an_area_are_those_of_the_image(size: tuple[int, int], parameters: EdgeParameters) -> None:
-    image = as_image(texture())[: size[0], : size[1]]
-    area = slice(10, size[0] - 8), slice(0, size[1] - 13)
-    whole, part = detect_edges(image, parameters), detect_edges_within(image, parameters, area, Scratch())
-    assert (part.low, part.high) == (whole.low, whole.high)
-    np.testing.assert_array_equal(part.gradient_x, whole.gradient_x[area])
-    np.testing.assert_array_equal(part.gradient_y, whole.gradient_y[area])
-    # At the area's border, and in weak edges that join strong ones outside of it only, they may differ.
-    assert (part.mask != whole.mask[area]).mean() < 0.04

@@ -62,10 +62,11 @@ class Profile:
     @cached_property
     def peaks(self) -> NDArray[np.intp]:
         """The disparities [px] of the positive local maxima, best first."""
-        rises = np.diff(self.values) >= 0.0
-        top = np.concatenate([[True], rises]) & np.concatenate([~rises, [True]]) & (self.values > 0.0)
-        found = np.flatnonzero(top)
-        return self.first_px + self.scale * found[np.argsort(-self.values[found])]
+        top, rises = self.values > 0.0, self.values[1:] >= self.values[:-1]
+        top[1:] &= rises
+        top[:-1] &= ~rises
+        (found,) = top.nonzero()
+        return self.first_px + self.scale * found[(-self.values[found]).argsort()]
 
     def deviations(self, d: float) -> float:
         """Return how far the correlation lies above the best that chance gives, in standard deviations (Fisher's z)."""
@@ -86,9 +87,16 @@ def _profile(pair: FoveaPair, window_px: float, parameters: DisparityParameters)
     at = (round(pair.point_px[0] / scale), round(pair.point_px[1] / scale))
     reach, vertical = parameters.max_px // scale, -(-parameters.max_vertical_px // scale)
     surface = correlate(left, right, at, window_px / scale, (-reach, reach), (-vertical, vertical))
-    x = pair.point_px[0] - (surface.first_d + np.arange(surface.zncc.shape[1])) * scale
-    visible = (x >= 0) & (x <= pair.left.shape[1] - 1)
-    values = np.where(visible, surface.profile, -1.0).astype(np.float32)
+    return _profile_of(surface, pair, window_px, scale, parameters)
+
+
+def _profile_of(
+    surface: Surface, pair: FoveaPair, window_px: float, scale: int, parameters: DisparityParameters
+) -> Profile:
+    values, x = surface.profile, pair.point_px[0] / scale - surface.first_d
+    # Column i is that of the point's place x - i in the right image.
+    values[: max(math.ceil(x - (pair.left.shape[1] - 1) / scale), 0)] = -1.0
+    values[max(math.floor(x) + 1, 0) :] = -1.0
     textured = surface.texture.signal >= parameters.min_texture
     return Profile(window_px, scale, surface.first_d * scale, values, textured, surface)
 
@@ -102,11 +110,7 @@ def column(pair: FoveaPair, vertical_px: int, span_px: tuple[int, int], paramete
     at = (round(pair.point_px[0]), round(pair.point_px[1]))
     rows = (vertical_px - _COLUMN_ROWS_PX, vertical_px + _COLUMN_ROWS_PX)
     surface = correlate(*pair.full, at, COLUMN_PX[0], span_px, rows, down=COLUMN_PX[1])
-    x = pair.point_px[0] - (surface.first_d + np.arange(surface.zncc.shape[1]))
-    visible = (x >= 0) & (x <= pair.left.shape[1] - 1)
-    values = np.where(visible, surface.profile, -1.0).astype(np.float32)
-    textured = surface.texture.signal >= parameters.min_texture
-    return Profile(COLUMN_PX[0], 1, surface.first_d, values, textured, surface)
+    return _profile_of(surface, pair, COLUMN_PX[0], 1, parameters)
 
 
 def vertical_px(layers: Sequence[Profile]) -> int:

@@ -66,6 +66,11 @@ def _sum(weights: NDArray[np.float32], values: NDArray[np.float32]) -> float:
     return float(np.einsum("ij,ij->", weights, values))
 
 
+def _mean(values: NDArray[np.float32]) -> float:
+    """Return the mean of an array, some microseconds sooner than its own method."""
+    return float(np.add.reduce(values, axis=None) / values.size)
+
+
 @dataclass(frozen=True)
 class Texture:
     """What the window about a point holds.
@@ -138,7 +143,7 @@ def texture_of(patch: NDArray[np.float32], across: float, down: float) -> Textur
     residual = np.abs(cv2.filter2D(patch, cv2.CV_32F, _LAPLACIAN)[1:-1, 1:-1]).ravel()
     middle = residual.size // 2  # of an odd number: np.median without its checks, which take longer than the sorting
     median = float(np.partition(residual, middle)[middle])
-    noise = min(1.4826 * median / 6.0, _NOISE_GAIN * float(residual.mean()))
+    noise = min(1.4826 * median / 6.0, _NOISE_GAIN * _mean(residual))
     gx = cv2.filter2D(patch, cv2.CV_32F, _DIFFERENCE)
     gy = cv2.filter2D(patch, cv2.CV_32F, _DIFFERENCE.T)
     # White noise of deviation s adds s^2/2 to the squared central difference.
@@ -200,7 +205,7 @@ def correlate(
     ys = sorted(at[1] + sign * v for v in v_range)
     top, first = ys[0] - int(other.y0) - ry, xs[0] - int(other.x0) - rx
     strip = other.grey[top : ys[1] - int(other.y0) + ry + 1, first : xs[1] - int(other.x0) + rx + 1]
-    strip = strip - float(strip.mean())  # keeps the float32 sum of squares exact enough
+    strip = strip - _mean(strip)  # keeps the float32 sum of squares exact enough
     product = cv2.matchTemplate(strip, kernel, cv2.TM_CCORR)
     mean, square = _windowed_mean(strip, sigma, down), _windowed_mean(strip * strip, sigma, down)
     # One grey level squared on both sides: flat areas correlate to nothing instead of to noise.

@@ -1,6 +1,7 @@
 """The surface that a point lies on: the plane of the strip's disparities about it, and which pixels belong to it."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ _NEAR_SIGMA_PX = 4.0
 _FEWEST = 12
 _ROUNDS = 3
 _SCATTER_PX = 0.3  # of semi-global disparities about their plane: what lies further off counts less
-_SLOPE_PRIOR = np.array([1e-6, 2.0, 2.0])
+_SLOPE_PRIOR = np.diag([1e-6, 2.0, 2.0])
 _STEEPEST = 0.3
 
 
@@ -48,41 +49,69 @@ def own_surface(patch: DisparityPatch, at: tuple[int, int], d: float, radius: in
         The surface; slopes are 0 and the disparity is `d` where too few pixels lie on it.
 
     """
-    values = patch.disparity_px
-    h, w = values.shape
-    u = (np.arange(w) + patch.x0 - at[0])[None, :].astype(np.float32)
-    v = (np.arange(h) + patch.y0 - at[1])[:, None].astype(np.float32)
-    tolerance = _TOLERANCE_PX + _TOLERANCE_PER_PX * np.sqrt(u * u + v * v)
-    plane = _plane(values, u, v, d, tolerance)
-    fits = np.abs(values - (plane[0] + plane[1] * u + plane[2] * v)) <= tolerance
-    radius = max(radius, round(float(np.abs(u).max())), round(float(np.abs(v).max())))
+    values, around = patch.disparity_px, _surroundings(patch.disparity_px.shape, (patch.x0 - at[0], patch.y0 - at[1]))
+    plane = _plane(values, around, d)
+    fits = np.abs(values - (plane[0] + plane[1] * around.u + plane[2] * around.v)) <= around.tolerance
+    radius = max(radius, around.reach)
     weights = np.zeros((2 * radius + 1, 2 * radius + 1), np.float32)
     top, first = patch.y0 - at[1] + radius, patch.x0 - at[0] + radius
-    weights[top : top + h, first : first + w] = fits
+    weights[top : top + values.shape[0], first : first + values.shape[1]] = fits
     return OwnSurface(*plane, Strip(weights, at[0] - radius, at[1] - radius))
 
 
-def _plane(
-    values: NDArray[np.float32],
-    u: NDArray[np.float32],
-    v: NDArray[np.float32],
-    d: float,
-    tolerance: NDArray[np.floating],
-) -> tuple[float, float, float]:
+@dataclass(frozen=True)
+class _Surroundings:
+    """The pixels (h, w) about a point, whatever they show.
+
+    `u` (1, w), `v` (h, 1) are their offsets from the point [px], `tolerance` (h, w) is how far their disparities may be
+    off the plane of its surface [px], `reach` the largest offset. `box` are the rows and columns nearest to the point,
+    `design` (3, n) and `weights` (n) those of a plane through their n pixels.
+    """
+
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+    tolerance: NDArray[np.floating]
+    reach: int
+    box: tuple[slice, slice]
+    design: NDArray[np.float64]
+    weights: NDArray[np.float64]
+
+
+@lru_cache(maxsize=8)
+def _surroundings(shape: tuple[int, ...], first: tuple[int, int]) -> _Surroundings:
+    """Return the surroundings of a point in a patch (h, w) whose first pixel has the offset `first`."""
+    u = (np.arange(shape[1]) + first[0])[None, :].astype(np.float32)
+    v = (np.arange(shape[0]) + first[1])[:, None].astype(np.float32)
+    tolerance = _TOLERANCE_PX + _TOLERANCE_PER_PX * np.sqrt(u * u + v * v)
     rows, columns = np.flatnonzero(np.abs(v[:, 0]) <= _NEAR_PX), np.flatnonzero(np.abs(u[0]) <= _NEAR_PX)
     box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-    near = values[box]
-    mine = np.abs(near - d) <= tolerance[box]
-    if np.count_nonzero(mine) < _FEWEST:
+    x, y = (np.broadcast_to(c, shape)[box].astype(np.float64) for c in (u, v))
+    weights = np.exp(-0.5 * (x * x + y * y) / _NEAR_SIGMA_PX**2)
+    reach = max(round(float(np.abs(c).max())) for c in (u, v))
+    return _Surroundings(u, v, tolerance, reach, box, np.stack([np.ones_like(x), x, y]).reshape(3, -1), weights.ravel())
+
+
+def _plane(values: NDArray[np.float32], around: _Surroundings, d: float) -> tuple[float, float, float]:
+    """Return the plane of the disparities near `d`: at the point, and its slopes across and down."""
+    near = values[around.box]
+    mine = np.flatnonzero(np.abs(near - d) <= around.tolerance[around.box])
+    if mine.size < _FEWEST:
         return d, 0.0, 0.0
-    x, y = (np.broadcast_to(c, values.shape)[box][mine].astype(np.float64) for c in (u, v))
-    observed = near[mine].astype(np.float64)
-    design = np.stack([np.ones_like(x), x, y])
-    prior = window = np.exp(-0.5 * (x * x + y * y) / _NEAR_SIGMA_PX**2)
-    for _ in range(_ROUNDS):
-        weighted = design * window
-        normal = np.einsum("in,jn->ij", weighted, design) + np.diag(_SLOPE_PRIOR)
-        found = np.linalg.solve(normal, np.einsum("in,n->i", weighted, observed))
+    observed, design = near.ravel()[mine].astype(np.float64), around.design.take(mine, axis=1)
+    prior = window = around.weights[mine]
+    found = _weighted_plane(design, observed, window)
+    for _ in range(_ROUNDS - 1):
         window = prior / (1.0 + np.square((observed - np.einsum("i,in->n", found, design)) / _SCATTER_PX))
-    slopes = np.clip(found[1:], -_STEEPEST, _STEEPEST)
-    return float(found[0]), float(slopes[0]), float(slopes[1])
+        found = _weighted_plane(design, observed, window)
+    level, *slopes = found.tolist()
+    across, down = (min(max(slope, -_STEEPEST), _STEEPEST) for slope in slopes)
+    return level, across, down
+
+
+def _weighted_plane(
+    design: NDArray[np.float64], observed: NDArray[np.float64], window: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the least-squares plane (3,) of disparities (n,) weighted by `window`, with a prior of no slope."""
+    weighted = design * window
+    normal = np.einsum("in,jn->ij", weighted, design) + _SLOPE_PRIOR
+    return np.linalg.solve(normal, np.einsum("in,n->i", weighted, observed))

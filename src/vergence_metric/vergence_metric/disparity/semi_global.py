@@ -177,7 +177,8 @@ class PointMatching:
         others = (self._column.deviations(d) for d in peaks[1:] if abs(d - peaks[0]) > 2.0 * _SAME_PX)
         if max(others, default=-math.inf) > _ELSEWHERE_DEVIATIONS:
             return None
-        support = self._support(float(peaks[0]), self._fine.about(*self._at, _NEAR_PX))
+        near = self._fine.about(*self._at, _NEAR_PX)
+        support = self._support(float(peaks[0]), self._fine.at(*self._at), near)
         return Choice(float(peaks[0]), "tall window alone", support, choice_score(support))
 
     def repeated(self, choice: Choice) -> list[float]:
@@ -214,10 +215,10 @@ class PointMatching:
         return max(math.floor(low) - _MARGIN_PX, -reach), min(math.ceil(high) + _MARGIN_PX, reach)
 
     def _choices(self, guess: float) -> list[Choice]:
-        named = [(self._fine.at(*self._at), "strip at full resolution")]
+        own = self._fine.at(*self._at)
+        named = [(own, "strip at full resolution")]
         named.append((guess, "strip at half resolution" if self._expected_px is None else "expected"))
-        beside = self._beside(named[0][0])
-        named += [(beside, "surface beside it")]
+        named.append((self._beside(own), "surface beside it"))
         for layer in self._layers:
             if layer.textured:
                 named += [(float(d), f"window of {layer.window_px:g} px") for d in layer.peaks[:_PEAKS]]
@@ -228,7 +229,7 @@ class PointMatching:
         for d, name in named:
             inside = math.isfinite(d) and abs(d) <= self._parameters.max_px
             if inside and all(abs(d - one.disparity_px) > _SAME_PX for one in found):
-                support = self._support(d, near)
+                support = self._support(d, own, near)
                 found.append(Choice(d, name, support, choice_score(support)))
         return found
 
@@ -238,11 +239,12 @@ class PointMatching:
         others = near[np.abs(near - own) > 2.0 * _SAME_PX]
         return float(np.median(others)) if others.size > _BESIDE_SHARE * near.size else math.nan
 
-    def _support(self, d: float, near: NDArray[np.float32]) -> Support:
+    def _support(self, d: float, own: float, near: NDArray[np.float32]) -> Support:
+        """Return what supports a candidate, by the strip's disparities at the point and near it (n) [px]."""
         correlated = [self._column] if self._column.textured else [one for one in self._layers if one.textured]
         return Support(
-            agrees=float(abs(self._fine.at(*self._at) - d) <= _SAME_PX),
-            near_share=float((np.abs(near - d) <= _SAME_PX).mean()) if near.size else 0.0,
+            agrees=float(abs(own - d) <= _SAME_PX),
+            near_share=np.count_nonzero(np.abs(near - d) <= _SAME_PX) / near.size if near.size else 0.0,
             column=sum(max(one.at(d), 0.0) for one in correlated) / len(correlated),
         )
 

@@ -48,12 +48,10 @@ class WindowContrast:
     window_px: int
 
 
-def small_windows(windows: Sequence[Window], foveal_sigma_px: float) -> tuple[Window, ...]:
-    """Return the windows that `least_contrast` and `foveal_contrast` need; the smallest one where none is small."""
+def small_windows(windows: Sequence[Window]) -> tuple[Window, ...]:
+    """Return the windows that `least_contrast` needs, by size; the smallest one where none is small."""
     ordered = sorted(windows, key=lambda window: window.size_px)
-    foveal = next((w for w in ordered if w.size_px >= _FOVEAL_SIGMAS * foveal_sigma_px), ordered[-1])
-    largest_px = max(foveal.size_px, SMALL_WINDOWS_PX[1])
-    return tuple(w for w in ordered if w.size_px <= largest_px)
+    return tuple(w for w in ordered if w.size_px <= SMALL_WINDOWS_PX[1]) or (ordered[0],)
 
 
 def least_contrast(field: OrientedField, truncation_px: int) -> WindowContrast:
@@ -130,7 +128,7 @@ def surface_contrast(
     ratios = []
     for direction in (0, 1):
         edges = field.images[direction]
-        on = counts[edges.row, edges.column]
+        on = counts[edges.places]
         if np.count_nonzero(on) < _FEWEST_EDGE_PIXELS:
             return math.nan
         everywhere = field.mean_distances_px(1 - direction, truncation_px, _LATTICE)[-1]

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_metric.edges.parameters import EdgeParameters
-from vergence_metric.edges.scratch import Scratch
 
 Grey = NDArray[np.uint8]
 Gradient = NDArray[np.int16]
+Thresholds = tuple[float, float]
+"""Canny's lower and upper one [grey levels]."""
 
 _SAMPLING = 4  # thresholds are taken from every 4th row and column
 
@@ -55,37 +56,18 @@ def to_grey(image: NDArray[Any]) -> Grey:
     raise ImageShapeError(f"image must be (h, w) grey or (h, w, 3) BGR: got shape {image.shape}")
 
 
-def detect_edges(grey: Grey, parameters: EdgeParameters) -> Edges:
-    """Return the edges of a (h, w) uint8 `grey` image.
+def detect_edges(grey: Grey, parameters: EdgeParameters, thresholds: Thresholds | None = None) -> Edges:
+    """Return the edges of a (h, w) uint8 `grey` image, by its own thresholds if none are given.
 
     Canny thins the gradient to one pixel and follows edges from the upper down to the lower threshold. Raises
     ImageShapeError where `grey` is not a grey image.
     """
-    blurred = _blurred(grey, parameters)
-    gradient_x, gradient_y = _gradients(blurred)
-    samples = gradient_x[::_SAMPLING, ::_SAMPLING], gradient_y[::_SAMPLING, ::_SAMPLING]
-    return _canny(gradient_x, gradient_y, _thresholds(*samples, parameters))
+    gradient_x, gradient_y = gradients(blurred(grey, parameters))
+    return canny(gradient_x, gradient_y, thresholds or thresholds_of(gradient_x, gradient_y, parameters))
 
 
-def detect_edges_within(grey: Grey, parameters: EdgeParameters, area: tuple[slice, slice], scratch: Scratch) -> Edges:
-    """Return the edges in an area (rows, columns) of a (h, w) uint8 `grey` image; arrays are of the area's size.
-
-    They are those of `detect_edges` there, except at the area's border, and for weak ones that join a strong one
-    outside of the area only. The thresholds are the whole image's. The gradients are good until `scratch` is used for
-    the next image.
-    """
-    blurred = _blurred(grey, parameters, scratch.array("blurred", grey.shape, np.uint8))
-    rows, columns = area
-    top, left = max(rows.start - 1, 0), max(columns.start - 1, 0)
-    around = blurred[top : rows.stop + 1, left : columns.stop + 1]
-    buffers = scratch.array("gradient x", around.shape, np.int16), scratch.array("gradient y", around.shape, np.int16)
-    inside = slice(rows.start - top, rows.stop - top), slice(columns.start - left, columns.stop - left)
-    gradient_x, gradient_y = (gradient[inside] for gradient in _gradients(around, buffers))
-    thresholds = _thresholds(*_sampled_gradients(blurred, scratch), parameters)
-    return _canny(gradient_x, gradient_y, thresholds)
-
-
-def _blurred(grey: Grey, parameters: EdgeParameters, buffer: Grey | None = None) -> Grey:
+def blurred(grey: Grey, parameters: EdgeParameters, buffer: Grey | None = None) -> Grey:
+    """Return the (h, w) grey image blurred, in the buffer if there is one; raises ImageShapeError for another."""
     if grey.ndim != 2 or grey.dtype != np.uint8 or grey.size == 0:
         raise ImageShapeError(f"grey image must be (h, w) uint8 and not empty: got {grey.dtype} of shape {grey.shape}")
     if parameters.blur_sigma_px > 0.0:
@@ -93,43 +75,33 @@ def _blurred(grey: Grey, parameters: EdgeParameters, buffer: Grey | None = None)
     return grey
 
 
-def _gradients(
-    blurred: Grey, buffers: tuple[Gradient | None, Gradient | None] = (None, None)
+def gradients(
+    image: Grey, buffer_x: Gradient | None = None, buffer_y: Gradient | None = None
 ) -> tuple[Gradient, Gradient]:
     """Return both Sobel derivatives, in the buffers if there are any."""
-    gradient_x, gradient_y = cv2.spatialGradient(blurred, *buffers, borderType=cv2.BORDER_REPLICATE)
+    gradient_x, gradient_y = cv2.spatialGradient(image, buffer_x, buffer_y, borderType=cv2.BORDER_REPLICATE)
     return np.asarray(gradient_x, np.int16), np.asarray(gradient_y, np.int16)
 
 
-def _sampled_gradients(blurred: Grey, scratch: Scratch) -> tuple[Gradient, Gradient]:
-    """Return both Sobel derivatives of every 4th row and column, without those between."""
-    height, width = blurred.shape
-    bordered = scratch.array("bordered", (height + 2, width + 2), np.uint8)
-    cv2.copyMakeBorder(blurred, 1, 1, 1, 1, cv2.BORDER_REPLICATE, dst=bordered)
-    rows, columns = ([slice(i, i + n, _SAMPLING) for i in range(3)] for n in (height, width))
-    above, here, below = ([bordered[row, column].astype(np.int16) for column in columns] for row in rows)
-    gradient_x = above[2] - above[0] + 2 * (here[2] - here[0]) + below[2] - below[0]
-    gradient_y = below[0] - above[0] + 2 * (below[1] - above[1]) + below[2] - above[2]
-    return gradient_x, gradient_y
-
-
-def _thresholds(gradient_x: Gradient, gradient_y: Gradient, parameters: EdgeParameters) -> tuple[float, float]:
-    """Return Canny's lower and upper threshold for an image with these derivatives at samples [grey levels].
+def thresholds_of(gradient_x: Gradient, gradient_y: Gradient, parameters: EdgeParameters) -> Thresholds:
+    """Return Canny's lower and upper threshold for an image with these derivatives [grey levels].
 
     Automatic ones: the upper threshold is the gradient (|dx| + |dy|, Canny's own measure) that a share
-    `auto_edge_share` of the samples exceeds, so that a change of exposure or gain scales it as it scales the gradients;
+    `auto_edge_share` of samples exceeds, so that a change of exposure or gain scales it as it scales the gradients;
     it never falls below `auto_floor`.
     """
     if parameters.threshold_mode == "fixed":
         return parameters.canny_low, parameters.canny_high
-    magnitude = np.abs(gradient_x)  # no more than 1020, as Sobel's of a byte image: counting is faster than sorting
-    magnitude += np.abs(gradient_y)
+    samples_x, samples_y = (gradient[::_SAMPLING, ::_SAMPLING] for gradient in (gradient_x, gradient_y))
+    # No more than 1020, as Sobel's of a byte image: counting is faster than sorting.
+    magnitude = np.abs(samples_x) + np.abs(samples_y)
     rank = round((1.0 - parameters.auto_edge_share) * (magnitude.size - 1))
     ranked = np.searchsorted(np.bincount(magnitude.ravel()).cumsum(), rank, side="right")
     high = max(float(ranked), parameters.auto_floor)
     return parameters.auto_low_ratio * high, high
 
 
-def _canny(gradient_x: Gradient, gradient_y: Gradient, thresholds: tuple[float, float]) -> Edges:
+def canny(gradient_x: Gradient, gradient_y: Gradient, thresholds: Thresholds) -> Edges:
+    """Return the edges of an image with these derivatives."""
     mask = cv2.Canny(gradient_x, gradient_y, *thresholds)
     return Edges(np.asarray(mask, np.uint8), gradient_x, gradient_y, *thresholds)

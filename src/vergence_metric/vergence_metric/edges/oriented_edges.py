@@ -29,17 +29,23 @@ Buffer = Callable[[tuple[int, ...], type[np.uint8]], NDArray[np.uint8]]
 class OrientedEdges:
     """Edge pixels of one image inside the largest window, and the neighbourhood of every pixel.
 
-    `row`, `column` (n,) count from the corner of the largest window, `bin` (n,) uint8 is the direction, `ring` (n,) the
-    index of the smallest window that holds the pixel, windows sorted by size. `planes` (radii, pixels) uint8 are the
-    planes the module describes, `at` (n,) the edge pixels' places in them.
+    `bin` (n,) uint8 is the direction, `ring` (n,) the index of the smallest window that holds the pixel, windows sorted
+    by size. `planes` (radii, pixels) uint8 are the planes the module describes, `at` (n,) the edge pixels' places in
+    them. The planes reach `margin` pixels beyond the largest window and are `stride` pixels wide.
     """
 
-    row: NDArray[np.int64]
-    column: NDArray[np.int64]
     bin: NDArray[np.uint8]
     ring: NDArray[np.int64]
     at: NDArray[np.int64]
     planes: NDArray[np.uint8]
+    margin: int
+    stride: int
+
+    @property
+    def places(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Rows and columns (n,) of the edge pixels from the corner of the largest window."""
+        row, column = np.divmod(self.at, self.stride)
+        return row - self.margin, column - self.margin
 
 
 @dataclass(frozen=True)
@@ -73,8 +79,8 @@ class OrientedField:
 
     def fovea_weights(self, image: int, sigma_px: float) -> NDArray[np.float64]:
         """Return a Gaussian weight of each edge pixel of `image` about the windows' centre, (n,)."""
-        edges, window = self.images[image], self.windows[-1]
-        return _gaussian(window.height, sigma_px)[edges.row] * _gaussian(window.width, sigma_px)[edges.column]
+        window, (row, column) = self.windows[-1], self.images[image].places
+        return _gaussian(window.height, sigma_px)[row] * _gaussian(window.width, sigma_px)[column]
 
     def _mean_distances(self, image: int, truncation_px: int, points_per_side: int) -> NDArray[np.float64]:
         planes, places = self.images[image].planes, _lattice(self.windows, self.truncation_px, points_per_side)
@@ -178,41 +184,36 @@ def _oriented(
         slice(inner.left - truncation, inner.right + truncation),
     )
     mask = _margined(edges.mask, rows, columns)
-    stride = mask.shape[1]
-    at = np.flatnonzero(mask != 0)
-    row, column = np.divmod(at, stride)
-    image_at = (row + rows.start, column + columns.start)
-    direction = np.arctan2(edges.gradient_y[image_at], edges.gradient_x[image_at], dtype=np.float32)
+    at = np.flatnonzero(mask)
+    across, down = (_margined(g, rows, columns).ravel()[at] for g in (edges.gradient_x, edges.gradient_y))
+    direction = np.arctan2(down, across, dtype=np.float32)
     per_turn = bins if signed else 2 * bins
     bin_ = (np.rint(direction * np.float32(per_turn / (2 * np.pi))).astype(np.int8) % bins).astype(np.uint8)
     base = np.zeros(mask.size, np.uint8)
     base[at] = np.left_shift(np.uint8(1), bin_)
-    row -= truncation
-    column -= truncation
-    ring = np.maximum(
-        _rings([(w.top - inner.top, w.bottom - inner.top) for w in windows], inner.height, truncation)[row],
-        _rings([(w.left - inner.left, w.right - inner.left) for w in windows], inner.width, truncation)[column],
-    )
+    planes = _planes(base, mask.shape[1], truncation, buffer)
+    ring = _rings(windows, truncation)[at]
     inside = np.flatnonzero(ring < len(windows))
-    return OrientedEdges(
-        row[inside], column[inside], bin_[inside], ring[inside], at[inside], _planes(base, stride, truncation, buffer)
-    )
+    return OrientedEdges(bin_[inside], ring[inside], at[inside], planes, truncation, mask.shape[1])
 
 
-def _margined(mask: NDArray[np.uint8], rows: slice, columns: slice) -> NDArray[np.uint8]:
-    """Return mask[rows, columns], with zeros where that leaves the mask."""
-    height, width = mask.shape
-    inside = mask[max(rows.start, 0) : rows.stop, max(columns.start, 0) : columns.stop]
+def _margined(image: NDArray[Any], rows: slice, columns: slice) -> NDArray[Any]:
+    """Return image[rows, columns], with zeros where that leaves the image."""
+    height, width = image.shape
+    inside = image[max(rows.start, 0) : rows.stop, max(columns.start, 0) : columns.stop]
     lacking = (max(-rows.start, 0), max(rows.stop - height, 0)), (max(-columns.start, 0), max(columns.stop - width, 0))
     return np.pad(inside, lacking) if any(map(any, lacking)) else inside
 
 
-def _rings(spans: list[tuple[int, int]], length: int, margin: int) -> NDArray[np.int64]:
-    """Return, for each position from 0 to length + margin and then from -margin, the first span that holds it."""
-    ring = np.full(length + 2 * margin, len(spans), np.int64)
-    for i, (start, stop) in reversed(list(enumerate(spans))):
-        ring[start:stop] = i
-    return ring
+@lru_cache(maxsize=16)
+def _rings(windows: tuple[Window, ...], margin: int) -> NDArray[np.int64]:
+    """Return which window is the first to hold each pixel of the last one and a margin, laid end to end."""
+    outer = windows[-1]
+    ring = np.full((outer.height + 2 * margin, outer.width + 2 * margin), len(windows), np.int64)
+    for i, window in reversed(list(enumerate(windows))):
+        top, left = window.top - outer.top + margin, window.left - outer.left + margin
+        ring[top : top + window.height, left : left + window.width] = i
+    return ring.ravel()
 
 
 def _planes(base: NDArray[np.uint8], stride: int, truncation: int, buffer: Buffer) -> NDArray[np.uint8]:

@@ -24,8 +24,9 @@ from vergence_metric.edges.contrast import (
     small_windows,
     surface_contrast,
 )
+from vergence_metric.edges.edge_detector import EdgeDetector
 from vergence_metric.edges.edge_distance import EdgeDistances, edge_distances
-from vergence_metric.edges.edges import Edges, Grey, ImageShapeError, detect_edges, detect_edges_within, to_grey
+from vergence_metric.edges.edges import Edges, Grey, ImageShapeError, Thresholds, detect_edges, to_grey
 from vergence_metric.edges.nearest_edges import NearestEdges
 from vergence_metric.edges.oriented_edges import OrientedField, oriented_field
 from vergence_metric.edges.parameters import ContrastParameters, EdgeParameters
@@ -35,7 +36,7 @@ from vergence_metric.edges.windows import Window, centre_windows, hull
 
 Values = NDArray[np.float64]
 
-_EDGE_REACH_PX = 75  # around the small windows: weak edges are followed so far to strong ones
+_EDGE_REACH_PX = 50  # around the small windows: weak edges are followed so far to strong ones
 
 
 @dataclass(frozen=True)
@@ -54,18 +55,18 @@ class EdgeMetricResult:
 
     `left_grey` and `right_grey` (h, w) uint8 are the images compared, the right one aligned. Arrays carry
     the names of vergence_msgs/EdgeVergence; values are float64, NaN where `status` (WindowStatus) gives a reason. Only
-    `foveal_contrast`, which is weighted by a Gaussian about the centre, and `least_contrast` of the small windows are
-    measured at once; the arrays are measured when they are read. `stage_s` is the duration of each stage so far [s].
+    `least_contrast`, that of the small windows, is measured at once; everything else is measured when it is read.
+    `thresholds` are Canny's for the left and the right image, `stage_s` is the duration of each stage so far [s].
     """
 
     windows: tuple[Window, ...]
     alignment: Alignment
     left_grey: Grey
     right_grey: Grey
-    foveal_contrast: float
     least_contrast: WindowContrast
     edge_parameters: EdgeParameters
     contrast_parameters: ContrastParameters
+    thresholds: tuple[Thresholds, Thresholds]
     stage_s: dict[str, float]
     small_field: OrientedField
     small_origin_px: tuple[int, int]
@@ -86,13 +87,13 @@ class EdgeMetricResult:
     def left_edges(self) -> Edges:
         """Edges of the whole left image."""
         with _timed(self.stage_s, "left_edges"):
-            return detect_edges(self.left_grey, self.edge_parameters)
+            return detect_edges(self.left_grey, self.edge_parameters, self.thresholds[0])
 
     @cached_property
     def right_edges(self) -> Edges:
         """Edges of the whole right image."""
         with _timed(self.stage_s, "right_edges"):
-            return detect_edges(self.right_grey, self.edge_parameters)
+            return detect_edges(self.right_grey, self.edge_parameters, self.thresholds[1])
 
     @property
     def windows_px(self) -> NDArray[np.uint32]:
@@ -150,6 +151,12 @@ class EdgeMetricResult:
         return self._contrasts.both[self._rank]
 
     @property
+    def foveal_contrast(self) -> float:
+        """Contrast at the fovea: edge pixels weigh less with their distance from the centre, by a Gaussian."""
+        p = self.contrast_parameters
+        return foveal_contrast(self._oriented, p.truncation_px, p.foveal_sigma_px)
+
+    @property
     def robust_left_to_right_px(self) -> Values:
         """Robust form of `left_to_right_px`."""
         return self._robust[0][self._rank]
@@ -197,7 +204,7 @@ class EdgeMetricResult:
 
 
 class EdgeMetric:
-    """Measures successive pairs, on one thread; its only state is the filtered alignment and reused memory."""
+    """Measures successive pairs, on one thread; its state is the alignment and the edges' thresholds."""
 
     def __init__(
         self,
@@ -209,7 +216,8 @@ class EdgeMetric:
         self._edges = edges or EdgeParameters()
         self._contrast = contrast or ContrastParameters()
         self._aligner = Aligner(alignment or AlignmentParameters())
-        self._scratch = (Scratch(), Scratch())  # one for each eye
+        self._detectors = (EdgeDetector(self._edges), EdgeDetector(self._edges))
+        self._scratch = Scratch()
 
     def measure(self, left: NDArray[Any], right: NDArray[Any], seen_px: int | None = None) -> EdgeMetricResult:
         """Measure a pair of (h, w, 3) BGR or (h, w) grey uint8 images of one size.
@@ -242,35 +250,25 @@ class EdgeMetric:
         p, stage_s = self._contrast, dict(pair.stage_s)
         height, width = pair.left_grey.shape
         windows = centre_windows(self._edges.windows_px, height, width, seen_px)
-        small = small_windows(windows, p.foveal_sigma_px)
+        small = small_windows(windows)
         outer = hull(small)
         area = (
             slice(max(outer.top - _EDGE_REACH_PX, 0), min(outer.bottom + _EDGE_REACH_PX, height)),
             slice(max(outer.left - _EDGE_REACH_PX, 0), min(outer.right + _EDGE_REACH_PX, width)),
         )
         with _timed(stage_s, "edges"):
-            scratch = self._scratch
+            images = (pair.left_grey, pair.right_grey)
             left, right = (
-                detect_edges_within(grey, self._edges, area, scratch[eye])
-                for eye, grey in enumerate((pair.left_grey, pair.right_grey))
+                detector.detect_within(grey, area) for detector, grey in zip(self._detectors, images, strict=True)
             )
         with _timed(stage_s, "contrast"):
             there = [window.shifted(area[0].start, area[1].start) for window in small]
-            oriented = _oriented_field(left, right, there, p, p.truncation_px, scratch[0])
-            foveal = foveal_contrast(oriented, p.truncation_px, p.foveal_sigma_px)
+            oriented = _oriented_field(left, right, there, p, p.truncation_px, self._scratch)
             least = least_contrast(oriented, p.truncation_px)
+        thresholds = (left.low, left.high), (right.low, right.high)
+        field, origin_px = oriented, (outer.left, outer.top)
         return EdgeMetricResult(
-            windows,
-            pair.alignment,
-            pair.left_grey,
-            pair.right_grey,
-            foveal,
-            least,
-            self._edges,
-            p,
-            stage_s,
-            oriented,
-            (outer.left, outer.top),
+            windows, pair.alignment, *images, least, self._edges, p, thresholds, stage_s, field, origin_px
         )
 
 

@@ -51,9 +51,8 @@ def correlation(area: Image, template: Template) -> NDArray[np.float32]:
     """Return the correlation (rows, columns) of a template with every place of an area (h, w); -1 where it has none."""
     how = cv2.TM_CCOEFF_NORMED
     surface = np.asarray(cv2.matchTemplate(area, template.image, how, mask=template.mask), np.float32)
-    usable = np.isfinite(surface) & (np.abs(surface) <= _LARGEST_CORRELATION)
-    if not usable.all():
-        surface[~usable] = -1.0
+    if template.mask is not None:
+        surface[~(np.abs(surface) <= _LARGEST_CORRELATION)] = -1.0  # or not finite
     return surface
 
 

@@ -69,6 +69,7 @@ class RememberedPatch:
     def __init__(self, image: Image, view: EyeView, pixel: Pixel, surroundings_m: float | None = None) -> None:
         self._view, self.surroundings_m = view, surroundings_m
         self.direction = view.direction(pixel)
+        self._place = np.array(view.pixel(self.direction))
         self._levels = {scale: reduced(image, scale) for scale in (1, _CONTEXT_SCALE, WIDE_SCALE)}
         self._levelled = {scale: levelled(level, scale) for scale, level in self._levels.items()}
         self._reaches = _reaches(image, pixel)
@@ -181,8 +182,7 @@ class RememberedPatch:
         turned = view.direction(at)
         middle = np.array(self._view.pixel(turned))
         then = [self._view.pixel(view.direction((at[0] + scale * x, at[1] + scale * y))) for x, y in corners]
-        place = np.array(self._view.pixel(self.direction))
-        source = (np.array(then) - middle + place - 0.5 * (scale - 1)) / scale
+        source = (np.array(then) - middle + self._place - 0.5 * (scale - 1)) / scale
         warp = cv2.getPerspectiveTransform(corners + np.array([left, top], np.float32), source.astype(np.float32))
         template = cv2.warpPerspective(
             (self._levelled if own is None else self._levels)[scale],

@@ -51,8 +51,8 @@ class TargetAppearance:
         self._recent = self._first
         self._previous = image
         self.pixel = pixel
-        self._features = self._find_features(image)
-        self._carried, self._step = self._features, 1.0
+        self._carried, self._step = self._find_features(image), 1.0
+        self._features: NDArray[np.float32] | None = self._carried  # None: to be found in the previous image
 
     def _patch(self, image: Image, pixel: Pixel) -> NDArray[np.float32]:
         """Return the patch about a pixel, resampled so that the pixel is at its very centre."""
@@ -101,25 +101,26 @@ class TargetAppearance:
         """Accept a sighting as the target's position; `renew` also updates the recent template."""
         self.pixel = sighting.pixel
         self.scale *= self._step
-        self._features = self._carried
+        too_few = len(self._carried) < _MAX_FEATURES // 2 and sighting.similarity > _MIN_SIMILARITY_FOR_FEATURES
+        self._features = None if too_few else self._carried
         if renew and sighting.similarity > _GOOD_SIMILARITY:
             self._recent = self._patch(image, self.pixel)
-        if len(self._features) < _MAX_FEATURES // 2 and sighting.similarity > _MIN_SIMILARITY_FOR_FEATURES:
-            self._features = self._find_features(image)
         self._previous = image
 
     def _flow(self, image: Image, expected_px: Pixel) -> tuple[Pixel | None, NDArray[np.float32], float]:
         """Follow the features to the new image; return the target's position, the features, and the change of scale."""
         none = np.empty((0, 2), np.float32)
-        if len(self._features) < _MIN_FEATURES:
+        # Only here: a target that its surroundings give is not followed by features.
+        features = self._find_features(self._previous) if self._features is None else self._features
+        if len(features) < _MIN_FEATURES:
             return None, none, 1.0
-        reach = np.abs(self._features - np.array(self.pixel)).max(axis=0)
+        reach = np.abs(features - np.array(self.pixel)).max(axis=0)
         half = np.ceil(reach).astype(int) + _FLOW_MARGIN_PX
         old = (round(self.pixel[0]) - int(half[0]), round(self.pixel[1]) - int(half[1]))
         new = (round(expected_px[0]) - int(half[0]), round(expected_px[1]) - int(half[1]))
         size = (2 * int(half[0]) + 1, 2 * int(half[1]) + 1)
         before, after = cut(self._previous, *old, *size), cut(image, *new, *size)
-        start = (self._features - np.array(old, np.float32)).reshape(-1, 1, 2)
+        start = (features - np.array(old, np.float32)).reshape(-1, 1, 2)
         options: dict[str, Any] = {"winSize": (13, 13), "maxLevel": 2, "criteria": (3, 15, 0.02)}
         there, found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, None, **options)
         back, returned, _ = cv2.calcOpticalFlowPyrLK(after, before, there, None, **options)
@@ -127,7 +128,7 @@ class TargetAppearance:
         good = (found.ravel() == 1) & (returned.ravel() == 1) & (trip < _ROUND_TRIP_PX)
         if int(good.sum()) < _MIN_FEATURES:
             return None, none, 1.0
-        before_px = self._features[good]
+        before_px = features[good]
         after_px = there.reshape(-1, 2)[good] + np.array(new, np.float32)
         shift = np.median(after_px - before_px, axis=0)
         agree = np.linalg.norm(after_px - before_px - shift, axis=1) < _OUTLIER_PX
