@@ -89,7 +89,7 @@ def _stages_ms(glance: Glance, case: Case) -> tuple[float, ...]:
         marks.append(time.process_time())
         if case.everything:
             disparity = measurement.disparity(edge)
-            measurement.verged(edge, disparity.horizontal_px, disparity.confidence)
+            measurement.verged(edge, disparity.horizontal_px, disparity.confidence, disparity.surface)
         marks.append(time.process_time())
         measurement.track(edge, stamp_s, glance.eyes, camera)
         marks.append(time.process_time())

@@ -1,4 +1,4 @@
-"""The edge contrast of photographs at vergence and off it, and the limits that `verged` has of it.
+"""The edge contrast of a target on photographs at vergence and off it, and the limits that `verged` has of it.
 
     python -m bench.photos_contrast
 
@@ -16,6 +16,8 @@ import numpy.typing as npt
 
 from bench.photos_data import pair_names, pair_of, photographs_rig, targets
 from bench.results import Row
+from vergence_metric.disparity import make_estimator
+from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.measurement.edge_metric import EdgeMetric
 from vergence_rig.servo import IDEAL
 from vergence_rig.verged import VergedLimits
@@ -32,7 +34,7 @@ _CHANCE = 1.0
 
 @dataclass(frozen=True)
 class Contrasts:
-    """The least contrast of the small windows on targets that are fixated, and with one eye turned past them."""
+    """The contrast of targets that are fixated, and with one eye turned past them: that which the tracker states."""
 
     verged: Array
     off: Array
@@ -41,7 +43,7 @@ class Contrasts:
 def measured(names: list[str]) -> Contrasts:
     """Return the contrasts on these pairs; views without edges have none and are left out."""
     cv2.setNumThreads(1)
-    verged: list[float] = []
+    estimator, verged = make_estimator(DisparityParameters()), list[float]()
     off: list[float] = []
     for name in names:
         pair, metric = pair_of(name), EdgeMetric()
@@ -54,8 +56,10 @@ def measured(names: list[str]) -> Contrasts:
                 world.head.place(pose, 0.0, dict.fromkeys(pose, 0.0))
                 seen = metric.measure(world.view("left"), world.view("right"))
                 metric.update_alignment()
-                if math.isfinite(seen.least_contrast.contrast):
-                    (off if off_deg else verged).append(seen.least_contrast.contrast)
+                surface = estimator.estimate(seen.left_grey, seen.right_grey).surface
+                contrast = seen.target_contrast(surface).contrast
+                if math.isfinite(contrast):
+                    (off if off_deg else verged).append(contrast)
     return Contrasts(np.array(verged), np.array(off))
 
 

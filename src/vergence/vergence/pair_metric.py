@@ -155,7 +155,7 @@ class PairMetric:
             angular = angular_disparity(
                 *seen.models, disparity.point_px, disparity.horizontal_px, disparity.vertical_px
             )
-            verged = self._measurement.verged(seen.edge, angular.horizontal_px, disparity.confidence)
+            verged = self._measurement.verged(seen.edge, angular.horizontal_px, disparity.confidence, disparity.surface)
             pair = seen.pair
             shown = Measurement(
                 pair.left_stamp_ns * 1e-9,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.alignment.alignment import Alignment
 from vergence_metric.disparity import Disparity, make_estimator
+from vergence_metric.disparity.protocol import Surface
 from vergence_metric.disparity.shared_estimate import SharedEstimate
 from vergence_metric.measurement.edge_metric import AlignedPair, EdgeMetric, EdgeMetricResult
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
@@ -93,10 +94,16 @@ class PairMeasurement:
         """Return the signed disparity at the left image's centre of a pair measured by `edge`."""
         return self._estimator.estimate(edge.left_grey, edge.right_grey)
 
-    def verged(self, edge: EdgeMetricResult, error_px: float, confidence: float) -> bool:
-        """Return whether the eyes are verged, by contrast, signed error, and the result of the last pair."""
+    def verged(
+        self, edge: EdgeMetricResult, error_px: float, confidence: float, surface: Surface | None = None
+    ) -> bool:
+        """Return whether the eyes are verged, by contrast, signed error, and the result of the last pair.
+
+        `surface` is what lies at the fovea, None where that was not measured.
+        """
         camera = self._camera or self._rig_camera
-        return self._classifier.update(edge.least_contrast.contrast, math.atan(error_px / camera.fx_px), confidence)
+        contrast = edge.target_contrast(surface).contrast
+        return self._classifier.update(contrast, math.atan(error_px / camera.fx_px), confidence)
 
     def request_track(self, request: TrackRequest, seen: SeenPair | None = None) -> None:
         """Let the tracker follow a point, from the next pair on; may be called from another thread.

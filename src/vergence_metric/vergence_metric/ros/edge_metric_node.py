@@ -164,7 +164,7 @@ class EdgeMetricNode(MetricNode):
         )
         with self._times.measure("publish"):
             error = error_message(disparity, angular, header, pair_skew_s)
-            verged = self._measurement.verged(edge, error.horizontal_px, error.confidence)
+            verged = self._measurement.verged(edge, error.horizontal_px, error.confidence, disparity.surface)
             self._error_publisher.publish(error)
             if self._edge_publisher.get_subscription_count():
                 # Its arrays are measured only now.
