@@ -58,9 +58,10 @@ def correlation(area: Image, template: Template) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=32)
 def distance_cost(shape: tuple[int, ...], prior: float, scale: int = 1) -> NDArray[np.float32]:
-    """Return by how much each place of a search is worse for its distance from the middle: `prior` at the rim.
+    """Return by how much each place of a search is worse for its distance from the expected one: `prior` at the rim.
 
-    At a scale, the middle of the middle place is half of what it has been reduced by to the right of that and below.
+    A place of an image that was reduced by `scale` is the mean of so many pixels: the middle one lies to the right of
+    the expected pixel, and below it.
     """
     half = 0.5 * (scale - 1) / scale
     reaches = (max((n - 1) // 2, 1) for n in shape)
