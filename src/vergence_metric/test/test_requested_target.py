@@ -119,6 +119,22 @@ def test_the_clicked_point_is_found_after_a_saccade_whose_joints_are_reported_wr
     assert track.disparity_px == pytest.approx(true_left[0] - true_right[0], abs=0.5)
 
 
+def test_a_jump_that_the_joints_report_a_pair_late_does_not_lose_the_point():
+    """The pair after it is searched about where the late report puts the point: as far away again, on the other side."""
+    stage = Stage()
+    stage.show(AHEAD)
+    stage.ask(ASIDE_M, AHEAD)
+    landed = gaze_for_point(np.array(ASIDE_M), RIG.baseline_m)
+    for _ in range(4):
+        stage.show(landed)
+    beside = turned(landed, -2.4, 2.2)
+    stage.show(beside, reported=landed)
+    for _ in range(6):
+        track = stage.show(beside)
+        np.testing.assert_allclose(track.left_px, project(ASIDE_M, True, beside), atol=1.0)
+    assert track.status is TrackStatus.OK
+
+
 def test_a_point_clicked_in_the_right_image_is_the_same_point():
     stage = Stage()
     stage.show(AHEAD)

@@ -95,6 +95,7 @@ def track_requested(
     disparity = estimator.estimate(pair.left, pair.right, sighting.pixel, expected_px)
     likeliest = weigh_depths(target, depths, disparity, sighting.pixel, pair)
     target.appearance.accept(pair.left, sighting, renew=disparity.ok)
+    target.off_px = distance(views[0].pixel(target.direction), sighting.pixel)
     target.update_direction(pair.stamp_s, views[0].direction(sighting.pixel))
     track = in_left_eye(target, sighting, disparity.reason or "another distance is likelier")
     ranked = [(disparity_of_parallax(one.parallax_rad, sighting.pixel, views), one.weight) for one in depths.ranked]
@@ -120,9 +121,11 @@ def find_by_surroundings(
     best place is returned however unlike it is.
     """
     p = parameters
-    # Joints that report no move have not moved; those that do may rest in their play, or lag behind.
+    # Joints that report no move have mostly not moved; those that do may rest in their play, or lag behind. What their
+    # report lacked in the last pair it has in this one.
     moved_px = distance(view.pixel(target.direction), target.appearance.pixel)
-    reach_px = min(_REST_PX + (_MOVED_PX + _MOVED_SHARE * moved_px if moved_px > 0.5 else 0.0), p.search_px)
+    reach_px = _REST_PX + target.off_px + (_MOVED_PX + _MOVED_SHARE * moved_px if moved_px > 0.5 else 0.0)
+    reach_px = min(reach_px, p.search_px)
     if target.hidden:
         reach_px = p.request_search_px + p.search_growth_px_s * (stamp_s - target.seen_s)
         reach_px = min(reach_px, p.request_search_max_px)

@@ -44,6 +44,7 @@ class Target:
     depths: DepthHypotheses | None = None  # of a requested target
     found: bool = True  # since its request
     most_at_point: float = 0.0  # of a requested target: what noise leaves of the point's similarity with itself
+    off_px: float = 0.0  # of a requested target: how far from its expected place it was found last
     goal_id: int = 0
     sightings: deque[tuple[float, np.ndarray]] = field(default_factory=deque)  # recent stamps and directions
     unbounded_pairs: int = 0  # in which it might have been segmented
