@@ -120,7 +120,7 @@ def test_the_clicked_point_is_found_after_a_saccade_whose_joints_are_reported_wr
 
 
 def test_a_jump_that_the_joints_report_a_pair_late_does_not_lose_the_point():
-    """The pair after it is searched about where the late report puts the point: as far away again, on the other side."""
+    """The next pair is searched about where the late report puts the point: as far away again, on the other side."""
     stage = Stage()
     stage.show(AHEAD)
     stage.ask(ASIDE_M, AHEAD)
