@@ -28,6 +28,7 @@ from vergence_metric.tracking.tracked_target import (
 USUAL_EXTENT_PX = (60.0, 60.0)
 _TURNED_PX = 2.0  # change of the vergence since the last match up to which the expected disparity is searched alone
 _REST_PX, _MOVED_PX, _MOVED_SHARE = 4.0, 8.0, 0.3  # how far a visible target may be from where it is expected
+_LATE_PX = 12.0  # by which it was found off from where play explains it: the joints had turned before they said so
 
 
 def requested_target(
@@ -124,7 +125,8 @@ def find_by_surroundings(
     # Joints that report no move have mostly not moved; those that do may rest in their play, or lag behind. What their
     # report lacked in the last pair it has in this one.
     moved_px = distance(view.pixel(target.direction), target.appearance.pixel)
-    reach_px = _REST_PX + target.off_px + (_MOVED_PX + _MOVED_SHARE * moved_px if moved_px > 0.5 else 0.0)
+    late_px = target.off_px if target.off_px > _LATE_PX else 0.0
+    reach_px = _REST_PX + late_px + (_MOVED_PX + _MOVED_SHARE * moved_px if moved_px > 0.5 else 0.0)
     reach_px = min(reach_px, p.search_px)
     if target.hidden:
         reach_px = p.request_search_px + p.search_growth_px_s * (stamp_s - target.seen_s)
