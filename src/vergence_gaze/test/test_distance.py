@@ -70,4 +70,4 @@ def test_a_baseline_known_to_one_percent_gives_distances_known_to_one_percent() 
     head = Kinematics(replace(RIG, baseline_sigma_m=0.01 * RIG.baseline_m))
     for distance_m in (0.3, 1.5):
         position = target_position(estimate(distance_m, sigma_rad=1e-6), head, NOTHING)
-        assert position.high_m - position.low_m == pytest.approx(2 * 1.9 * 0.01 * distance_m, rel=0.05)
+        assert position.high_m - position.low_m == pytest.approx(2 * 1.8 * 0.01 * distance_m, rel=0.05)

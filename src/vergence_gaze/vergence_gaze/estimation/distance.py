@@ -19,7 +19,7 @@ from vergence_rig.rig import Rig
 
 Array = npt.NDArray[np.float64]
 
-_TO_95_PERCENT = 1.9  # servo errors are bounded: their tails are lighter than a normal distribution has
+_TO_95_PERCENT = 1.8  # servo errors are bounded: their tails are lighter than a normal distribution has
 _PLAY_SIGMA_SHARE = 0.22 / math.sqrt(3.0)
 """Dead band and play of a servo are each within a fifth or so of its data sheet; on which side it rests is modelled."""
 _SHARED_NOISE = 1.6
