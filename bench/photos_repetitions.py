@@ -17,7 +17,7 @@ from bench.photos_data import pair_names, pair_of, photographs_rig, targets
 from vergence_metric.disparity import make_estimator
 from vergence_metric.disparity.parameters import DisparityParameters
 from vergence_metric.disparity.protocol import DisparityStatus
-from vergence_metric.edges.verged_contrast import contrast_if_verged
+from vergence_metric.edges.verged_contrast import contrasts_if_verged
 from vergence_metric.measurement.edge_metric import EdgeMetric
 from vergence_metric.tracking.depth_evidence import CONTRAST_POWER, LEAST_CONTRAST
 from vergence_rig.servo import IDEAL
@@ -71,9 +71,8 @@ def seen() -> list[list[Repetition]]:
                 right = np.abs(offered[:, 0] - (at[0] - there[0])) <= _SAME_PX
                 if right.any() and not right.all():
                     y = at[1] - disparity.vertical_px
-                    contrast = [
-                        contrast_if_verged(views.left_grey, views.right_grey, at, (at[0] - d, y)) for d in offered[:, 0]
-                    ]
+                    places = [(at[0] - d, y) for d in offered[:, 0].tolist()]
+                    contrast = contrasts_if_verged(views.left_grey, views.right_grey, at, places)
                     of_target.append(Repetition(np.nan_to_num(contrast, nan=1.0), offered[:, 1], right))
             if of_target:
                 found.append(of_target)

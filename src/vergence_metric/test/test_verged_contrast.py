@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vergence_metric.disparity.protocol import Candidate, Disparity, DisparityStatus
-from vergence_metric.edges.verged_contrast import contrast_if_verged
+from vergence_metric.edges.verged_contrast import contrasts_if_verged
 from vergence_metric.tracking.depth_evidence import parallax_shares
 from vergence_metric.tracking.eye_view import EyeView
 from vergence_metric.tracking.request import StoredPair
@@ -39,13 +39,14 @@ def at(disparity_px):
 
 def test_it_is_low_where_the_point_is_and_about_one_elsewhere():
     left, right = fence(0), fence(TRUE_PX)
-    assert contrast_if_verged(left, right, AT, at(TRUE_PX)) < 0.2
-    assert contrast_if_verged(left, right, AT, at(TRUE_PX + 11.0)) > 0.7
+    there, elsewhere = contrasts_if_verged(left, right, AT, [at(TRUE_PX), at(TRUE_PX + 11.0)])
+    assert there < 0.2
+    assert elsewhere > 0.7
 
 
 def test_without_edges_it_is_nan():
     flat = np.full((480, 640), 90, np.uint8)
-    assert np.isnan(contrast_if_verged(flat, flat, AT, at(TRUE_PX)))
+    assert np.isnan(contrasts_if_verged(flat, flat, AT, [at(TRUE_PX)])).all()
 
 
 def repeats(status):

@@ -7,7 +7,7 @@ about the point, in all directions, agree best where it really is.
 import numpy as np
 
 from vergence_metric.disparity.protocol import Disparity, DisparityStatus
-from vergence_metric.edges.verged_contrast import contrast_if_verged
+from vergence_metric.edges.verged_contrast import contrasts_if_verged
 from vergence_metric.tracking.eye_view import Pixel
 from vergence_metric.tracking.request import StoredPair
 from vergence_metric.tracking.tracked_target import parallax
@@ -36,7 +36,7 @@ def parallax_shares(disparity: Disparity, left_px: Pixel, pair: StoredPair) -> l
     at = [(left_px[0] - d, y) for d, _ in seen]
     shares = np.array([share for _, share in seen])
     if repeated:
-        contrast = np.array([contrast_if_verged(pair.left, pair.right, left_px, right_px) for right_px in at])
+        contrast = contrasts_if_verged(pair.left, pair.right, left_px, at)
         weighed = shares * np.power(np.nan_to_num(contrast, nan=1.0) + LEAST_CONTRAST, CONTRAST_POWER)
         shares = weighed * shares.sum() / weighed.sum()
     return [
