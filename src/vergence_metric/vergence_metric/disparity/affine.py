@@ -40,6 +40,7 @@ _PRIOR_SHEAR = 0.1  # standard deviation of slant and roll between the eyes
 _PRIOR_VERTICAL_PX = 1.0
 
 Matrix = NDArray[np.float64]
+Samples = NDArray[np.float32]
 Warp = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Two rows: the linear part's two columns, and the translation [px]."""
 
@@ -136,7 +137,7 @@ def fit_affine(
     gain = 1.0
     for _ in range(_ITERATIONS):
         seen = window.seen(right, point_px, ((a, b, x), (c, d, y)), gain)
-        solution = window.inverse @ np.einsum("in,n->i", window.weighted, window.roots * seen)
+        solution = window.solution(seen)
         gain = float(solution[6])
         if not _LEAST_GAIN <= gain <= 1.0 / _LEAST_GAIN:
             return None
@@ -155,66 +156,74 @@ def fit_affine(
             return None
         if max(map(abs, step)) < _CONVERGED_PX:
             break
-    residual = seen - np.einsum("i,in->n", solution, window.design)
-    variance = float(np.square(window.roots * residual).sum())
-    sigma_px = math.hypot(window.deviation(residual) / gain, _FLOOR_PX)
-    return Fit(-x, -y, sigma_px, math.sqrt(variance), np.array([[a, b], [c, d]]), window.texture)
+    weighted = window.weighted_residual(seen, solution)
+    sigma_px = math.hypot(window.deviation(weighted) / gain, _FLOOR_PX)
+    residual = math.sqrt(float(np.square(weighted).sum()))
+    return Fit(-x, -y, sigma_px, residual, np.array([[a, b], [c, d]]), window.texture)
 
 
 @dataclass(frozen=True)
 class _Window:
-    """The left image about the point as a linear model: `design` (8, N) are the six affine increments, gain, offset.
+    """The left image about the point as a linear model of six affine increments, gain and offset.
 
     Of its N = n x n samples, `stride_px` apart, `offsets` are u (1, n) and v (n, 1) from the point [px], `gradients`
-    (2, n, n) those across and down, `roots` (N) those of the weights, which sum to 1, `weighted` is their product with
-    the design and `inverse` (8, 8) that of the normal matrix; `texture` is the weighted deviation of the grey levels.
+    (2, n, n) those across and down, `roots` (N) those of the weights, which sum to 1, `weighted` (8, N) is their
+    product with the model's parts and `inverse` (8, 8) that of the normal matrix; `texture` is the weighted deviation
+    of the grey levels. What has an entry for each sample is float32.
     """
 
     stride_px: int
-    offsets: tuple[NDArray[np.floating], NDArray[np.floating]]
-    gradients: NDArray[np.floating]
-    roots: Matrix
-    design: Matrix
-    weighted: Matrix
+    offsets: tuple[Samples, Samples]
+    gradients: Samples
+    roots: Samples
+    weighted: Samples
     inverse: Matrix
     texture: float
 
     @cached_property
-    def _buffers(self) -> tuple[Matrix, Matrix, NDArray[np.float32]]:
+    def _buffers(self) -> tuple[Samples, Samples]:
         """Arrays as large as `gradients` that every iteration reuses."""
-        shape = self.gradients.shape
-        return np.empty(shape), np.empty(shape), np.empty(shape, np.float32)
+        return np.empty_like(self.gradients), np.empty_like(self.gradients)
 
-    def seen(self, right: Strip, point_px: tuple[float, float], warp: Warp, gain: float) -> Matrix:
-        """Return what the right image shows at the warped offsets (N)."""
+    def seen(self, right: Strip, point_px: tuple[float, float], warp: Warp, gain: float) -> Samples:
+        """Return what the right image shows at the warped offsets, weighted (N)."""
         # remap of OpenCV 4 rounds to a grid, that of OpenCV 5 does not: round first, make good what that misses.
-        steps, near, maps = self._buffers
+        steps, maps = self._buffers
         (u, v), first = self.offsets, (right.x0, right.y0)
         for i, (across, down, shift) in enumerate(warp):
-            fixed = (_REMAP_STEPS * down) * v + _REMAP_STEPS * (shift + point_px[i] - first[i])
+            fixed = (_REMAP_STEPS * down) * v + np.float32(_REMAP_STEPS * (shift + point_px[i] - first[i]))
             np.add((_REMAP_STEPS * across) * u, fixed, out=steps[i])
-        np.rint(steps, out=near)
-        maps[...] = near
+        np.rint(steps, out=maps)
+        steps -= maps
         maps *= np.float32(1.0 / _REMAP_STEPS)
         sampled = cv2.remap(right.grey, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        steps -= near
         steps *= self.gradients
         seen = steps[0] + steps[1]
-        seen *= gain / _REMAP_STEPS
+        seen *= np.float32(gain / _REMAP_STEPS)
         seen += sampled
-        return np.asarray(seen.ravel())
+        weighted = seen.ravel()
+        weighted *= self.roots
+        return weighted
 
-    def deviation(self, residual: Matrix) -> float:
+    def solution(self, seen: Samples) -> Matrix:
+        """Return the model's parameters (8): the increments times the gain, gain and offset."""
+        return np.asarray(self.inverse @ np.einsum("in,n->i", self.weighted, seen))
+
+    def weighted_residual(self, seen: Samples, solution: Matrix) -> Samples:
+        """Return what the model leaves of what is seen, weighted (N)."""
+        return np.asarray(seen - np.einsum("i,in->n", solution.astype(np.float32), self.weighted))
+
+    def deviation(self, weighted_residual: Samples) -> float:
         """Return the standard deviation of the horizontal translation [px, times gain] by the residuals (N).
 
         Residuals correlate between neighbouring pixels (blur, edges, unmodelled depth): their effect is summed in
         blocks before it is squared, as in estimates consistent under autocorrelation (Newey and West, 1987).
         """
-        effect = self.roots * np.einsum("i,in->n", self.inverse[0], self.weighted) * residual
+        effect = weighted_residual * np.einsum("i,in->n", self.inverse[0].astype(np.float32), self.weighted)
         effect = effect.reshape(self.gradients.shape[1:])
         side = -(-_BLOCK_PX // self.stride_px)
         blocks = cv2.boxFilter(effect, -1, (side, side), normalize=False, borderType=cv2.BORDER_CONSTANT)
-        return math.sqrt(float((blocks**2).sum())) / side
+        return math.sqrt(float(np.square(blocks).sum())) / side
 
 
 def _linearised(
@@ -230,13 +239,13 @@ def _linearised(
         rows = slice(y + first + down, y + last + down + 1, stride)
         return left.grey[rows, x + first + right : x + last + right + 1 : stride]
 
-    patch = shifted(0, 0).astype(np.float64)
-    gradients = np.empty((2, *patch.shape), left.grey.dtype)
+    patch = shifted(0, 0)
+    gradients = np.empty((2, *patch.shape), np.float32)
     np.subtract(shifted(1, 0), shifted(-1, 0), out=gradients[0])
     np.subtract(shifted(0, 1), shifted(0, -1), out=gradients[1])
     gradients *= 0.5
-    u = (offsets + (x + left.x0 - point_px[0]))[None, :]
-    v = (offsets + (y + left.y0 - point_px[1]))[:, None]
+    u = (offsets + (x + left.x0 - point_px[0])).astype(np.float32)[None, :]
+    v = (offsets + (y + left.y0 - point_px[1])).astype(np.float32)[:, None]
     across, down = np.exp(-0.5 * (u / sigma) ** 2), np.exp(-0.5 * (v / sigma) ** 2)
     roots = np.sqrt(down / down.sum()) * np.sqrt(across / across.sum())
     share = 1.0
@@ -249,25 +258,25 @@ def _linearised(
             return None
         roots /= math.sqrt(share)
     centred = patch - float((roots * roots * patch).sum())
-    # Offsets are scaled by the window, so that the rows of the design are of one size.
-    design = np.empty((8, *patch.shape))
-    for part, gradient in zip((design[:3], design[3:6]), gradients, strict=True):
-        part[0] = gradient
-        np.multiply(gradient, u / sigma, out=part[1])
-        np.multiply(gradient, v / sigma, out=part[2])
-    design[6], design[7] = centred, 1.0
-    design = design.reshape(8, -1)
-    weighted = design * roots.ravel()
+    # Offsets are scaled by the window, so that the rows of the model are of one size.
+    weighted = np.empty((8, *patch.shape), np.float32)
+    for part, gradient in zip((weighted[:3], weighted[3:6]), gradients, strict=True):
+        np.multiply(gradient, roots, out=part[0])
+        np.multiply(part[0], u / sigma, out=part[1])
+        np.multiply(part[0], v / sigma, out=part[2])
+    np.multiply(centred, roots, out=weighted[6])
+    weighted[7] = roots
+    weighted = weighted.reshape(8, -1)
     # OpenCV and einsum, not matmul: BLAS threads wait for one another whenever other nodes hold the cores.
-    normal = cv2.mulTransposed(weighted, False)
+    normal = cv2.mulTransposed(weighted.astype(np.float64), False)
     if float(normal[6, 6]) < _LEAST_VARIANCE:
         return None
-    try:
-        inverse = np.linalg.inv(normal + np.diag(_damping(sigma, share)))
-    except np.linalg.LinAlgError:
-        return None
     texture = math.sqrt(float(normal[6, 6]))
-    return _Window(stride, (u, v), gradients, roots.ravel(), design, weighted, inverse, texture)
+    normal.flat[::9] += _damping(sigma, share)
+    determined, inverse = cv2.invert(normal, flags=cv2.DECOMP_CHOLESKY)
+    if not determined:
+        return None
+    return _Window(stride, (u, v), gradients, roots.ravel(), weighted, inverse, texture)
 
 
 def _damping(sigma: float, share: float) -> Matrix:

@@ -126,7 +126,7 @@ _SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorde
 
 
 def oriented_field(
-    left: Edges,
+    left: Edges | OrientedEdges,
     right: Edges,
     windows: Sequence[Window],
     *,
@@ -140,7 +140,8 @@ def oriented_field(
     `bins` directions over 360 degrees with `signed`, which distinguishes dark-to-bright from bright-to-dark, else over
     180; the first is centred on horizontal gradients. Neighbours may lie outside a window: unlike
     the paper's metric this one only reaches `truncation_px`, and edges cut off by a window's border would add noise.
-    With `scratch` the memory is taken from there: the field is then good until the next one made with it.
+    With `scratch` the memory is taken from there: the field is then good until the next one made with it. `left` may
+    be that of another field with the same windows, bins and cut-off.
     """
     if not 1 <= truncation_px <= MAX_TRUNCATION_PX or not 1 <= bins <= MAX_BINS:
         raise ValueError(
@@ -149,7 +150,9 @@ def oriented_field(
     ordered = tuple(sorted(windows, key=lambda window: window.size_px))
     scratch = scratch or Scratch()
     images = [
-        _oriented(edges, ordered, bins, signed, truncation_px, partial(scratch.array, name))
+        edges
+        if isinstance(edges, OrientedEdges)
+        else _oriented(edges, ordered, bins, signed, truncation_px, partial(scratch.array, name))
         for edges, name in ((left, "left planes"), (right, "right planes"))
     ]
     return OrientedField(ordered, bins, truncation_px, (images[0], images[1]))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vergence_metric.edges.contrast import foveal_contrast
 from vergence_metric.edges.edges import Edges, Grey, detect_edges
-from vergence_metric.edges.oriented_edges import oriented_field
+from vergence_metric.edges.oriented_edges import OrientedEdges, oriented_field
 from vergence_metric.edges.parameters import ContrastParameters, EdgeParameters
 from vergence_metric.edges.windows import centre_window
 
@@ -34,10 +34,12 @@ def contrasts_if_verged(
     """
     contrast, windows = ContrastParameters(), (centre_window(_WINDOW_PX, _SIDE_PX, _SIDE_PX),)
     bins, signed, truncation_px = contrast.orientation_bins, contrast.orientation_signed, contrast.truncation_px
-    here, found = _edges_about(left, left_px), list[float]()
+    found: list[float] = []
+    here: Edges | OrientedEdges = _edges_about(left, left_px)
     for px in right_px:
         there = _edges_about(right, px)
         field = oriented_field(here, there, windows, bins=bins, signed=signed, truncation_px=truncation_px)
+        here = field.images[0]
         found.append(foveal_contrast(field, truncation_px, contrast.foveal_sigma_px))
     return np.array(found)
 

@@ -5,6 +5,7 @@ depth. What was seen is therefore warped to how it must look now, and only its p
 reported angles of hobby servos are off by up to degrees. The wide view says where the eye has turned to, the context
 where the point is (beside the wide view's place if it is near and the lens is off its axis), the point itself the rest.
 Along an edge or without texture, where a level looks the same everywhere, the place of the level before is kept.
+Of an eye at rest the context is seen at once where it is expected, and mostly that is enough.
 """
 
 import math
@@ -26,6 +27,7 @@ from vergence_metric.tracking.surroundings import WIDE_HALF_PX, WIDE_SCALE
 _WIDE_SIMILARITY = 0.7  # from which the wide view's place is where the context is looked for
 _WIDE_REACH_PX = 16  # that parallax may move the point beside it
 _OWN_REACH_PX = 8  # the same where the head's geometry says how far it does: the point's own pixels may be few
+_CLOSE_PX, _CLEAR_SPREAD_PX = 4, 3.0  # of an eye at rest: where its context alone is sought, and must be at one place
 _CONTEXT_HALF_PX, _CONTEXT_SCALE = 48, 2  # on photographs the smallest that rarely errs
 _POINT_HALF_PX, _NARROW_HALF_PX = 16, 6  # the latter where its background has moved, and may fill most of the former
 NEVER = -1.0
@@ -96,9 +98,14 @@ class RememberedPatch:
             return None
         far = self._far(view, direction, distance_m)
         own, half_px = _counting(_is_displaced(expected, far), own)
-        expected, reach, prior, wide_spread_px = self._about(image, view, expected, far, reach_px)
-        size = (_CONTEXT_HALF_PX, _CONTEXT_SCALE)
-        places, spread_px = self._places(image, view, expected, reach, size, _CANDIDATES, prior, own)
+        size, reach, prior = (_CONTEXT_HALF_PX, _CONTEXT_SCALE), reach_px, _PRIOR
+        places, spread_px = list[tuple[Pixel, float]](), math.inf
+        if reach <= _CLOSE_PX:
+            places, spread_px = self._places(image, view, expected, reach, size, 1, prior, own)
+        if not _is_clear(places, spread_px, expected, reach):
+            expected, reach, prior, wide_spread_px = self._about(image, view, expected, far, reach_px)
+            places, spread_px = self._places(image, view, expected, reach, size, _CANDIDATES, prior, own)
+            spread_px = min(spread_px, wide_spread_px)
         if not places:
             return None
         template = self._template(image, view, expected, (half_px, 1), own)
@@ -109,7 +116,7 @@ class RememberedPatch:
             evidence = float(evidence_of(np.array([similarity, at_point], np.float32)).sum())
             found.append((evidence - prior * off**2, similarity, at_point, pixel))
         _, similarity, at_point, pixel = max(found)
-        sighting = PatchSighting(pixel, similarity, at_point, min(spread_px, wide_spread_px))
+        sighting = PatchSighting(pixel, similarity, at_point, spread_px)
         if min(similarity, at_point) >= alone_below:
             return sighting
         return self._alone(image, view, expected, reach, prior, own) or sighting
@@ -247,6 +254,17 @@ def _reaches(image: Image, pixel: Pixel) -> tuple[float, float, float, float]:
 def _is_displaced(at: Pixel, far: Pixel) -> bool:
     """Return whether what lies far behind a point has moved against it."""
     return distance(at, far) > _SAME_PX
+
+
+def _is_clear(places: list[tuple[Pixel, float]], spread_px: float, expected: Pixel, reach_px: int) -> bool:
+    """Return whether the best of a search's places is alike, alone, and not at the rim: nothing else need be looked at.
+
+    A place at the rim may be on the way to a better one; along an edge its neighbours look the same.
+    """
+    if not places or places[0][1] < _WIDE_SIMILARITY or spread_px > _CLEAR_SPREAD_PX:
+        return False
+    (x, y), _ = places[0]
+    return max(abs(x - expected[0]), abs(y - expected[1])) < reach_px - 1
 
 
 def _counting(displaced: bool, own: MaskAt | None) -> tuple[MaskAt | None, int]:
