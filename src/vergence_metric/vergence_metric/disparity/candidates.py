@@ -81,13 +81,24 @@ def profiles(pair: FoveaPair, parameters: DisparityParameters) -> list[Profile]:
     return [_profile(pair, window_px, parameters) for window_px in parameters.windows_px]
 
 
-def _profile(pair: FoveaPair, window_px: float, parameters: DisparityParameters) -> Profile:
+def _profile(
+    pair: FoveaPair, window_px: float, parameters: DisparityParameters, at_px: Sequence[float] = ()
+) -> Profile:
+    """Correlate a window over the whole range, or only about some disparities."""
     scale = 1 if window_px < _HALVED_FROM_PX else 2
     left, right = pair.full if scale == 1 else pair.half
     at = (round(pair.point_px[0] / scale), round(pair.point_px[1] / scale))
     reach, vertical = parameters.max_px // scale, -(-parameters.max_vertical_px // scale)
-    surface = correlate(left, right, at, window_px / scale, (-reach, reach), (-vertical, vertical))
+    searched = _about(at_px, scale, reach) if at_px else (-reach, reach)
+    surface = correlate(left, right, at, window_px / scale, searched, (-vertical, vertical))
     return _profile_of(surface, pair, window_px, scale, parameters)
+
+
+def _about(at_px: Sequence[float], scale: int, reach: int) -> tuple[int, int]:
+    """Return the columns that `Profile.at` looks at for some disparities, the first and the last, within a reach."""
+    columns = [min(max(round(d / scale), -reach), reach) for d in at_px]
+    first = (min(columns) - 1) // 2 * 2  # an even one, from which half columns are rounded alike
+    return max(first, -reach), min(max(columns) + 1, reach)
 
 
 def _profile_of(
@@ -134,8 +145,7 @@ def repetitions(pair: FoveaPair, d: float, layers: Sequence[Profile], parameters
     textured = [layer for layer in layers if layer.textured]
     if not textured:
         return []
-    reach = -textured[0].first_px
-    rivals = [float(r) for r in textured[0].peaks if _APART_PX < abs(r - d) <= reach]
+    rivals = [float(r) for r in textured[0].peaks if _APART_PX < abs(r - d) <= parameters.max_px]
     for layer in textured:
         least = max(_AS_GOOD * _unexplained(layer.at(d)), _AS_ITSELF * _unexplained(_REPEATS))
         rivals = [r for r in rivals if _unexplained(layer.at(r)) <= least]
@@ -145,7 +155,7 @@ def repetitions(pair: FoveaPair, d: float, layers: Sequence[Profile], parameters
         if not rivals:
             break
         wide = replace(pair, margin_px=radius_of(window_px) + 4)
-        rivals = _repeated(wide, d, rivals, _profile(wide, window_px, parameters))
+        rivals = _repeated(wide, d, rivals, _profile(wide, window_px, parameters, [d, *rivals]))
     return rivals
 
 
@@ -154,7 +164,7 @@ def _repeated(pair: FoveaPair, d: float, rivals: list[float], layer: Profile) ->
     texture = layer.surface.texture
     if not rivals or texture.signal < _CLEAR * texture.noise:
         return rivals
-    itself, own = _self_correlation(pair, layer), _AS_GOOD * _unexplained(layer.at(d))
+    itself, own = _self_correlation(pair, layer, [r - d for r in rivals]), _AS_GOOD * _unexplained(layer.at(d))
     least = _REPEATS * (texture.signal / max(texture.deviation, 1e-3)) ** 2  # noise is not repeated
     fits = [(r, itself.at(r - d)) for r in rivals]
     # A repetition that falls between pixels fits no better than the texture fits itself there.
@@ -163,14 +173,14 @@ def _repeated(pair: FoveaPair, d: float, rivals: list[float], layer: Profile) ->
     ]
 
 
-def _self_correlation(pair: FoveaPair, layer: Profile) -> Profile:
-    """Correlate a window with its own row in the left image."""
+def _self_correlation(pair: FoveaPair, layer: Profile, shifts_px: Sequence[float]) -> Profile:
+    """Correlate a window with its own row in the left image, about some shifts."""
     left = pair.full[0] if layer.scale == 1 else pair.half[0]
     at = (round(pair.point_px[0] / layer.scale), round(pair.point_px[1] / layer.scale))
-    reach = len(layer.values) // 2
     sigma, texture = layer.window_px / layer.scale, layer.surface.texture
-    surface = correlate(left, left, at, sigma, (-reach, reach), (-1, 1), texture=texture)
-    return replace(layer, values=surface.profile, surface=surface)
+    searched = _about(shifts_px, layer.scale, pair.reach_px // layer.scale)
+    surface = correlate(left, left, at, sigma, searched, (-1, 1), texture=texture)
+    return replace(layer, first_px=layer.scale * searched[0], values=surface.profile, surface=surface)
 
 
 def _unexplained(correlation: float) -> float:

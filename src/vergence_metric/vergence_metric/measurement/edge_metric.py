@@ -36,7 +36,7 @@ from vergence_metric.edges.windows import Window, centre_windows, hull
 
 Values = NDArray[np.float64]
 
-_EDGE_REACH_PX = 50  # around the small windows: weak edges are followed so far to strong ones
+_EDGE_REACH_PX = 32  # around the small windows: weak edges are followed so far to strong ones
 
 
 @dataclass(frozen=True)
