@@ -5,7 +5,7 @@ depth. What was seen is therefore warped to how it must look now, and only its p
 reported angles of hobby servos are off by up to degrees. The wide view says where the eye has turned to, the context
 where the point is (beside the wide view's place if it is near and the lens is off its axis), the point itself the rest.
 Along an edge or without texture, where a level looks the same everywhere, the place of the level before is kept.
-Of an eye at rest the context is seen at once where it is expected, and mostly that is enough.
+Of an eye at rest the context is looked at where it is expected first: if it is there, that is enough.
 """
 
 import math
@@ -97,10 +97,11 @@ class RememberedPatch:
         if not (-reach_px <= expected[0] < width + reach_px and -reach_px <= expected[1] < height + reach_px):
             return None
         far = self._far(view, direction, distance_m)
-        own, half_px = _counting(_is_displaced(expected, far), own)
+        displaced = _is_displaced(expected, far)
+        own, half_px = _counting(displaced, own)
         size, reach, prior = (_CONTEXT_HALF_PX, _CONTEXT_SCALE), reach_px, _PRIOR
         places, spread_px = list[tuple[Pixel, float]](), math.inf
-        if reach <= _CLOSE_PX:
+        if reach <= _CLOSE_PX and not displaced:
             places, spread_px = self._places(image, view, expected, reach, size, 1, prior, own)
         if not _is_clear(places, spread_px, expected, reach):
             expected, reach, prior, wide_spread_px = self._about(image, view, expected, far, reach_px)
