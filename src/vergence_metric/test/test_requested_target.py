@@ -344,6 +344,17 @@ def test_a_point_without_texture_stays_where_its_surroundings_are():
         np.testing.assert_allclose(track.left_px, (320.0, 240.0), atol=2.0)
 
 
+@pytest.mark.parametrize("moved", [(0, 0), (2, -1), (4, 3), (9, -6), (-14, 3)])
+def test_a_point_is_found_though_the_eye_has_moved_and_reports_none(moved):
+    scene = texture(12, (480, 640))
+    eye = EyeView(CAMERA, 0.0, 0.0)
+    patch = RememberedPatch(with_noise(scene, 1), eye, (320.0, 240.0))
+    found = patch.find(with_noise(np.roll(scene, moved[::-1], axis=(0, 1)), 2), eye, patch.direction, 4)
+    assert found is not None
+    np.testing.assert_allclose(found.pixel, (320.0 + moved[0], 240.0 + moved[1]), atol=0.5)
+    assert found.similarity > 0.9
+
+
 def test_along_an_edge_the_place_stays_where_it_is_expected_pair_after_pair():
     """What is reduced has no place exactly at the expected one: half a place too far a pair adds up."""
     bars = np.tile(texture(6, (1, 640), sigmas=(3.0, 9.0)), (480, 1))
