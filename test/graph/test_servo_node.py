@@ -401,3 +401,27 @@ def test_joint_states_come_less_often_while_nothing_moves_and_the_pose_before_a_
     graph.drive(pan_left=0.3)
     graph.until(lambda: graph.states[-1].position[0] == pytest.approx(0.3, abs=1e-3))
     graph.until(lambda: not node._updates.fast and not node._reports.fast)
+
+
+def test_a_command_that_is_repeated_keeps_servos_at_rest(
+    make_graph: Callable[..., Graph], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(servo_node, "_RESTING_AFTER_S", 0.0)
+    graph = make_graph()
+    node = graph.node
+    assert node is not None
+
+    def repeat() -> None:
+        graph.command(pan_left=0.3)
+
+    graph.until(lambda: bool(graph.states) and graph.states[-1].position[0] == pytest.approx(0.3, abs=1e-3), repeat)
+    graph.until(lambda: not node._reports.fast, repeat)
+    accepted, rates = node._counts.accepted["joint_command"], list[bool]()
+
+    def repeated() -> bool:
+        rates.append(node._reports.fast)
+        return node._counts.accepted["joint_command"] > accepted + 3
+
+    graph.until(repeated, repeat)
+    assert not any(rates)
+    assert graph.states[-1].velocity[0] == 0.0

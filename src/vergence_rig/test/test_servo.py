@@ -99,6 +99,18 @@ def test_shaft_ends_within_the_uncertainty_and_never_exceeds_its_speed(spec: Ser
     assert plant.modelled_rad == angles[-1]
 
 
+def test_a_servo_rests_once_its_newest_command_has_had_its_effect() -> None:
+    plant = ServoPlant(SG90, 0.0)
+    assert plant.at_rest
+    plant.command(0.1, 0.0)
+    for now_s in (0.0, 0.014, 0.02):
+        plant.step(now_s)
+        assert not plant.at_rest
+    plant.step(0.1)
+    assert plant.at_rest
+    assert plant.modelled_rad == 0.1
+
+
 def test_time_does_not_run_backwards() -> None:
     plant = ServoPlant(ServoSpec(speed_rad_s=1.0))
     plant.command(1.0, 0.0)

@@ -114,6 +114,11 @@ class ServoPlant:
         """The motor's speed at the end of the last step [rad/s]."""
         return self._velocity_rad_s
 
+    @property
+    def at_rest(self) -> bool:
+        """True if `modelled_rad` stays as it is until the next command."""
+        return not self._pending and self._modelled_rad == self._commanded_rad
+
     def command(self, angle_rad: float, now_s: float) -> None:
         """Command an angle [rad] at `now_s`; raises ValueError for one that is not finite."""
         if not math.isfinite(angle_rad):

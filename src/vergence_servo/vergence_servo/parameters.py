@@ -57,7 +57,7 @@ class ServoNodeParameters(HeadParameters):
     )
     state_rate_hz: float = parameter(
         50.0,
-        "rate at which joint_states is published; at most 10 Hz while no servo has been commanded or moved for 1 s",
+        "rate at which joint_states is published; at most 10 Hz while no servo has moved for 0.2 s",
         unit="Hz",
         minimum=1,
         maximum=500,

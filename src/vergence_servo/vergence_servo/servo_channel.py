@@ -90,6 +90,11 @@ class ServoChannel:
         self._plant.step(now_s)
         return self._plant.modelled_rad
 
+    @property
+    def at_rest(self) -> bool:
+        """True if the modelled position stays as it is until another pulse is sent."""
+        return self._plant.at_rest
+
     def attach(self, now_s: float) -> None:
         """Begin to send pulses, at the estimated position."""
         self._send(self._pulse_us, now_s)

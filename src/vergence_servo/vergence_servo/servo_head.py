@@ -191,16 +191,16 @@ class ServoHead:
         return all(channel.state is ChannelState.FAILED or channel.arrived(wanted) for channel, wanted in commanded)
 
     @property
-    def commanded(self) -> bool:
-        """True while commands, a trajectory or parking say where the servos are to be."""
-        return self.mode in (Mode.COMMANDED, Mode.PARKING)
-
-    @property
     def under_way(self) -> bool:
         """True while the next step may send something else than the last one, without another command."""
         if self._trajectory is not None or self.mode is Mode.PARKING:
             return True
         return any(self.channels[name].under_way(wanted_rad) for name, wanted_rad in self._wanted_rad.items())
+
+    @property
+    def at_rest(self) -> bool:
+        """True if every modelled position stays as it is until another command."""
+        return not self.under_way and all(channel.at_rest for channel in self.channels.values())
 
     @property
     def pulsing(self) -> bool:

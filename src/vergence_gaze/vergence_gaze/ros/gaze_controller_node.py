@@ -13,7 +13,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
-from vergence_common.camera_infos import subscribe_camera_info
+from vergence_common.camera_infos import CameraInfoInput
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.joint_states import JointStateInput
 from vergence_common.node_main import run_node
@@ -30,6 +30,7 @@ from vergence_gaze.parameter_groups import collected, gaze_groups
 from vergence_gaze.parameters import GazeNodeParameters, GazeParameters
 from vergence_gaze.ros import gaze_messages as convert
 from vergence_gaze.ros.goal_server import GoalServer
+from vergence_gaze.ros.joint_command import JointCommandOutput
 from vergence_gaze.ros.look_at_server import LookAtServer
 from vergence_gaze.ros.point_frames import PointFrames
 from vergence_gaze.ros.point_head_server import make_point_head_server
@@ -42,6 +43,7 @@ from vergence_rig.rig_file import load_rig
 
 _FEEDBACK_EVERY = 10
 _MARKERS_EVERY = 10
+_CAMERAS_EVERY = 10
 _RESTING_PERIOD_S = 0.1  # of cycles, while nothing is commanded and nothing reads the reports
 
 
@@ -72,8 +74,8 @@ class GazeControllerNode(Node):
         if point_head is not None:
             self._servers.append(point_head)
         for server in self._servers:
-            server.on_request = self._end_rest
-        self._command, self._to_command = watch.create_publisher(JointState, "joint_command"), convert.JointCommand()
+            server.on_request = self._on_request
+        self._command = JointCommandOutput(watch.create_publisher(JointState, "joint_command"))
         self._track_requests = watch.create_publisher(TrackRequest, "vergence/track_request")
         # Latched: what holds until the next message, for nodes that start later.
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -91,8 +93,10 @@ class GazeControllerNode(Node):
         watch.create_subscription(DetectorClasses, "vergence/detector_classes", self._on_classes, latched)
         watch.create_subscription(PointStamped, "gaze/target", self._on_target)
         watch.create_subscription(String, "gaze/attention", self._on_attention)
-        subscribe_camera_info(watch, "left/camera_info", lambda m: self._on_camera(m, left=True))
-        subscribe_camera_info(watch, "right/camera_info", lambda m: self._on_camera(m, left=False))
+        self._camera_infos = [
+            CameraInfoInput(self, watch, "left/camera_info", lambda m: self._on_camera(m, left=True)),
+            CameraInfoInput(self, watch, "right/camera_info", lambda m: self._on_camera(m, left=False)),
+        ]
         self.create_service(SetBool, "~/enable", self._on_enable)
         self.create_service(Trigger, "~/stop", self._on_stop)
         period_s = 1.0 / values.control_rate_hz
@@ -151,6 +155,14 @@ class GazeControllerNode(Node):
         if any(self._read):
             self._end_rest()
 
+    def _on_request(self) -> None:
+        self._read_cameras()
+        self._end_rest()
+
+    def _read_cameras(self) -> None:
+        for info in self._camera_infos:
+            info.read()
+
     def _end_rest(self) -> None:
         """Go on at the full rate, with what has arrived: something is requested or read."""
         if self._cycle_timer.set_fast(True):
@@ -160,6 +172,8 @@ class GazeControllerNode(Node):
     def _cycle(self) -> None:
         now_s = self._now_s()
         arrived, self._arrived = self._arrived, []
+        if self._cycles % _CAMERAS_EVERY == 0:
+            self._read_cameras()
         self._cycles += 1
         if not self._controller.rests(now_s) or any(self._read):
             self._end_rest()
@@ -176,8 +190,7 @@ class GazeControllerNode(Node):
 
     def _publish(self, command: Command, now_s: float) -> None:
         report, (state_read, fixation_read, markers_read) = command.report, self._read
-        if command.joints_rad is not None:
-            self._command.publish(self._to_command(command.joints_rad, now_s))
+        self._command.update(command.joints_rad, now_s)
         if command.track_request is not None:
             self._track_requests.publish(convert.track_request(command.track_request, self._images))
         if command.object_request is not None:

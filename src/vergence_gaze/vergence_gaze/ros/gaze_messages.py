@@ -1,7 +1,6 @@
 """The controller's messages to and from its plain values."""
 
 import math
-from array import array
 
 import numpy as np
 import numpy.typing as npt
@@ -159,19 +158,6 @@ def camera_model(message: CameraInfo) -> CameraModel:
     return CameraModel.from_camera_info_values(
         message.width, message.height, message.k, message.d, message.distortion_model
     )
-
-
-class JointCommand:
-    """Commands by joint name. One message is filled anew for each: making one costs more than filling it."""
-
-    def __init__(self) -> None:
-        self._message = JointState(name=list(JOINT_NAMES))
-
-    def __call__(self, joints_rad: Array, stamp_s: float) -> JointState:
-        """Return the command, valid until the next call."""
-        self._message.header.stamp = to_stamp(stamp_s)
-        self._message.position = array("d", joints_rad.tolist())
-        return self._message
 
 
 def gaze_state(report: GazeReport, now_s: float) -> GazeState:

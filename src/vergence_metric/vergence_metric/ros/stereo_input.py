@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, QoSReliabilityPolicy
+from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
 from vergence_common.awaited import report_awaited
-from vergence_common.camera_infos import subscribe_camera_info
+from vergence_common.camera_infos import CameraInfoInput
 from vergence_common.diagnostics import ERROR, OK, WARN, Diagnostics, Report
 from vergence_common.images import ImageError, compressed_to_array, image_to_array
 from vergence_common.local_images import LocalImages
@@ -34,9 +34,6 @@ from vergence_rig.rig import Rig
 _SOURCES = (
     "Images come from camera_node (rig.launch.py), sim_node (sim.launch.py), photo_node or another camera's driver"
 )
-
-# camera_info is small and repeated with every image; best effort is compatible with every publisher.
-_INFO_QOS = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +81,7 @@ class StereoInput:
         self._to_pixels: Callable[[Any], npt.NDArray[np.uint8]] = compressed_to_array if compressed else image_to_array
         self._health = tuple(StreamHealth(f"{name}/{suffix}", monotonic()) for name in SIDES)
         self._subscriptions: list[Subscription] = []
+        self._infos: list[CameraInfoInput] = []
         self._local: list[tuple[str, Any]] = []
         self.resumed_ns = -1_000_000_000
         """ROS time of the last `resume` [ns]; far in the past where there was none."""
@@ -94,13 +92,13 @@ class StereoInput:
         for side, name in enumerate(SIDES):
             diagnostics.add(f"{name} images", lambda side=side: self._stream_report(side))  # type: ignore[misc]
         diagnostics.add("pairs", self._pairs_report)
-        diagnostics.add("cameras", self.cameras.report)
+        diagnostics.add("cameras", self._cameras_report)
         report_awaited(node, lambda: [health.topic for health in self._health if not health.received], _SOURCES)
 
     @property
     def paused(self) -> bool:
         """True while nothing is received, since `pause`."""
-        return not self._subscriptions
+        return not self._infos
 
     def pause(self) -> None:
         """Receive nothing until `resume`; images that this node shares with others are received all the same."""
@@ -109,6 +107,9 @@ class StereoInput:
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         self._subscriptions.clear()
+        for info in self._infos:
+            info.close()
+        self._infos.clear()
         for topic, receiver in self._local:
             self._images.remove(topic, receiver)  # type: ignore[union-attr]
         self._local.clear()
@@ -130,7 +131,7 @@ class StereoInput:
                 if images is not None:
                     images.offer(self._topics[side])
             on_info = partial(self.cameras.on_info, side)
-            self._subscriptions.append(subscribe_camera_info(qos, f"{name}/camera_info", on_info, _INFO_QOS))
+            self._infos.append(CameraInfoInput(self._node, qos, f"{name}/camera_info", on_info))
 
     def set_parameters(self, stereo: StereoParameters, pairing: PairingParameters) -> None:
         """Use these from the next image on; the transport stays as it is."""
@@ -207,6 +208,8 @@ class StereoInput:
         if deadline_ns is not None:
             self._deadline.timer_period_ns = max(deadline_ns - monotonic_ns(), 1)
             self._deadline.reset()
+        if pairs:
+            self._read_infos()
         for pair in filter(None, map(self._decoded_pair, pairs)):
             left, right = pair.left.pixels.shape, pair.right.pixels.shape
             if left[:2] != right[:2] and self.cameras.cameras_of(pair) is None:
@@ -218,6 +221,15 @@ class StereoInput:
                 continue
             self._size_mismatch = None
             self._on_pair(pair)
+
+    def _read_infos(self) -> None:
+        for info in self._infos:
+            info.read()
+
+    def _cameras_report(self) -> Report:
+        with self._lock:
+            self._read_infos()
+        return self.cameras.report()
 
     def _stream_report(self, side: int) -> Report:
         health = self._health[side]

@@ -39,7 +39,7 @@ from vergence_servo.servo_head import Mode
 from vergence_servo.servo_reports import CommandCounts, channel_report, commands_report, head_report
 from vergence_servo.trajectory import Trajectory, check_end, start_delay_s
 
-_RESTING_AFTER_S = 1.0  # without commands and motion, from when joint_states come at a lower rate
+_RESTING_AFTER_S = 0.2  # without motion, from when joint_states come at a lower rate
 _RESTING_PERIOD_S = 0.1  # of joint_states then, and of time-outs while no servo is under way
 
 COMMAND_TOPICS = ("joint_command", "~/commands", "joint_trajectory")
@@ -167,9 +167,9 @@ class ServoNode(Node):
         return None
 
     def _end_rest(self) -> None:
-        """Step and report at the full rate again, the pose before any motion first."""
+        """Step and report at the full rate where something is to move, the pose before the motion first."""
         self._updates.set_fast(self._head.under_way)
-        if self._reports.set_fast(True):
+        if not self._head.at_rest and self._reports.set_fast(True):
             self._publish_state()
 
     def _check_stamp(self, message: JointState) -> None:
@@ -201,7 +201,7 @@ class ServoNode(Node):
         elapsed_s = max(now_s - before_s, 1e-3)
         velocities = {name: (position - before.get(name, position)) / elapsed_s for name, position in positions.items()}
         self._reported_rad = (now_s, positions)
-        if self._head.commanded or positions != before:
+        if not self._head.at_rest:
             self._moved_s = now_s
         self._states.publish(convert.joint_state(self.get_clock().now().to_msg(), positions, velocities))
 

@@ -165,13 +165,7 @@ def _zero_stamp(message: JointState) -> list[JointState]:
 
 
 def _stuck(head: FaultyHead) -> None:
-    held = head.joints_rad.tolist()
-
-    def report(message: JointState) -> list[JointState]:
-        message.position = held
-        return [message]
-
-    head.report = report
+    head.follows = False
 
 
 _LEFT, _RIGHT, _PICTURES = (

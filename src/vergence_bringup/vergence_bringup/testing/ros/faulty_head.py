@@ -40,6 +40,7 @@ class FaultyHead(Node):
     """Publishes images, camera_info and joint_states, and follows joint_command.
 
     `show`, `report` and `describe` change what is published; each is called with the message's values just before.
+    While `follows` is False the servos are stuck.
     """
 
     def __init__(self, wall: TexturedWall, **options: Any) -> None:
@@ -61,7 +62,8 @@ class FaultyHead(Node):
         return np.array([servo.true_rad for servo in self._servos])
 
     def heal(self) -> None:
-        """Publish everything as it is."""
+        """Publish everything as it is, and follow commands."""
+        self.follows = True
         self.show: Callable[[Shown], None] = lambda shown: None
         self.report: Callable[[JointState], list[JointState]] = lambda message: [message]
         self.describe: Callable[[CameraInfo], None] = lambda message: None
@@ -73,7 +75,7 @@ class FaultyHead(Node):
 
     def _on_command(self, message: JointState) -> None:
         for name, angle_rad in zip(message.name, message.position, strict=False):
-            if name in JOINT_NAMES:
+            if name in JOINT_NAMES and self.follows:
                 self._servos[JOINT_NAMES.index(name)].command(angle_rad, self._ticks * TICK_S)
 
     def _tick(self) -> None:
