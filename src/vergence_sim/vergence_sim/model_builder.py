@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_sim.surfaces import Image
-from vergence_sim.unit_meshes import FACES, SHEET, SLICES, unit_meshes
+from vergence_sim.unit_meshes import FACES, SHEET, SHEET_KINDS, SLICES, unit_meshes
 
 # Seen from outside with z up, MuJoCo shows the images of the first three on their sides or upside down.
 _UPRIGHT = {"right": cv2.ROTATE_90_COUNTERCLOCKWISE, "left": cv2.ROTATE_90_CLOCKWISE, "up": cv2.ROTATE_180}
@@ -94,15 +94,15 @@ class ModelBuilder:
     def _material(self, kind: str, name: str) -> str:
         """Return the material of a texture on a kind of shape; makes that of a wrapped one when it is first needed.
 
-        A box's is one flat texture of its six sides: Mesa draws a cube texture in more than twice the time.
+        A box's or ball's is one flat texture of its six sides: Mesa draws a cube texture in more than twice the time.
         """
         images = self._wraps.get(name)
         if images is None:
             return name
-        material = f"{name}_sheet" if kind == "box" else name
+        material = f"{name}_sheet" if kind in SHEET_KINDS else name
         if material not in self._materials:
             self._materials.add(material)
-            if kind == "box":
+            if kind in SHEET_KINDS:
                 faces = dict(zip(FACES, images, strict=True))
                 sheet = np.vstack([np.hstack([faces[face] for face in row]) for row in SHEET])
                 texture = f'type="2d" file="{self._file(material, sheet)}"'

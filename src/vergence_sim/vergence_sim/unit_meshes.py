@@ -1,7 +1,8 @@
-"""Meshes of half size 1 that are drawn, stretched, in place of MuJoCo's own boxes and cylinders: they cost less.
+"""Meshes of half size 1 that are drawn, stretched, in place of MuJoCo's own shapes: they cost less.
 
-A textured box has one flat texture of its six sides, which Mesa draws faster than a cube texture. A cylinder has as
-many sides as MuJoCo's (`numslices`), but these and its ends are in one piece each.
+A textured box or ball has one flat texture of its six sides, which Mesa draws faster than a cube texture; on a ball the
+sides' pictures meet as on a cube. A cylinder has as many sides as MuJoCo's (`numslices`), but these and its ends are in
+one piece each.
 """
 
 import math
@@ -13,10 +14,12 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import as_strided
 
 FACES = ("right", "left", "up", "down", "front", "back")
-"""Of a box, named as in MuJoCo's cube textures: what looks along +x, -x, +y, -y, +z, -z."""
+"""Sides of a box, or of a ball, named as in MuJoCo's cube textures: what looks along +x, -x, +y, -y, +z, -z."""
 SHEET = (("right", "up", "left"), ("down", "front", "back"))
-"""Rows of a box's flat texture, each face upright as seen from outside."""
-UNIT_BOX, UNIT_CYLINDER = "unit_box", "unit_cylinder"
+"""Rows of a box's or ball's flat texture, each face upright as seen from outside."""
+SHEET_KINDS = ("box", "ellipsoid", "sphere")
+"""MuJoCo's kinds of shapes that have a sheet."""
+UNIT_BOX, UNIT_BALL, UNIT_CYLINDER = "unit_box", "unit_ball", "unit_cylinder"
 SLICES = 14
 """Sides of a cylinder."""
 
@@ -24,7 +27,8 @@ SLICES = 14
 _RIGHT = np.array(((0, 1, 0), (0, -1, 0), (-1, 0, 0), (1, 0, 0), (1, 0, 0), (-1, 0, 0)))
 _TOP = np.array(((0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 1, 0), (0, 1, 0)))
 
-_BOX, _CYLINDER, _MESH = (int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in ("BOX", "CYLINDER", "MESH"))
+_BOX, _BALLS = mujoco.mjtGeom.mjGEOM_BOX, (mujoco.mjtGeom.mjGEOM_ELLIPSOID, mujoco.mjtGeom.mjGEOM_SPHERE)
+_CYLINDER, _MESH = int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_MESH)
 _GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
 
 _Corners = list[npt.NDArray[np.float64]]
@@ -35,12 +39,14 @@ class UnitMeshes:
 
     def __init__(self, model: mujoco.MjModel) -> None:
         meshes = np.full(model.ngeom, -1)
-        meshes[(model.geom_type == _BOX) & (model.geom_matid >= 0)] = model.mesh(UNIT_BOX).id
+        textured = model.geom_matid >= 0
+        meshes[textured & (model.geom_type == _BOX)] = model.mesh(UNIT_BOX).id
+        meshes[textured & np.isin(model.geom_type, _BALLS)] = model.mesh(UNIT_BALL).id
         meshes[model.geom_type == _CYLINDER] = model.mesh(UNIT_CYLINDER).id
         self._meshes: list[int] = meshes.tolist()
 
     def put_in(self, scene: mujoco.MjvScene) -> None:
-        """Let a scene's textured boxes and its cylinders be drawn as the meshes, once after each update."""
+        """Let a scene's textured boxes and balls and its cylinders be drawn as the meshes, once after each update."""
         geoms = scene.geoms[: scene.ngeom]
         replaced = [
             number for number, geom in enumerate(geoms) if geom.objtype == _GEOM and self._meshes[geom.objid] >= 0
@@ -48,7 +54,7 @@ class UnitMeshes:
         if not replaced:
             return
         for geom in (geoms[number] for number in replaced):
-            geom.texcoord = int(geom.type == _BOX)
+            geom.texcoord = int(geom.type != _CYLINDER)
             geom.type, geom.dataid = _MESH, 2 * self._meshes[geom.objid]
         # Orientations (N, 3, 3) times half sizes (N, 3), of all geoms at once: one by one takes much longer.
         step = geoms[-1].size.ctypes.data - geoms[0].size.ctypes.data
@@ -58,23 +64,32 @@ class UnitMeshes:
         turns[replaced] *= sizes[replaced, None]
 
 
-def unit_meshes() -> tuple[str, str]:
-    """Return UNIT_BOX and UNIT_CYLINDER as MJCF assets."""
-    return _box(), _cylinder()
+def unit_meshes() -> tuple[str, str, str]:
+    """Return UNIT_BOX, UNIT_BALL and UNIT_CYLINDER as MJCF assets."""
+    return _sides(UNIT_BOX, 1, False), _sides(UNIT_BALL, 4, True), _cylinder()
 
 
-def _box() -> str:
+def _sides(name: str, parts: int, rounded: bool) -> str:
+    """Return a cube of six sides in parts x parts quadrangles each, or a ball: the same, moved to distance 1."""
     corners: _Corners = []
     normals: _Corners = []
     places: _Corners = []
-    for name, right, top in zip(FACES, _RIGHT, _TOP, strict=True):
-        (row,) = (number for number, names in enumerate(SHEET) if name in names)
-        column, outwards = SHEET[row].index(name), np.cross(right, top)
-        for across, up in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
-            corners.append(outwards + across * right + up * top)
-            normals.append(outwards)
-            places.append(np.array([(column + 0.5 + 0.5 * across) / 3, (row + 0.5 - 0.5 * up) / 2]))
-    return _mesh(UNIT_BOX, corners, normals, [range(first, first + 4) for first in range(0, 24, 4)], places)
+    faces = []
+    # Parts of a ball are seen from its centre under equal angles.
+    steps = np.tan(np.linspace(-math.pi / 4, math.pi / 4, parts + 1))
+    for side, right, top in zip(FACES, _RIGHT, _TOP, strict=True):
+        (row,) = (number for number, names in enumerate(SHEET) if side in names)
+        column, outwards = SHEET[row].index(side), np.cross(right, top)
+        first = len(corners)
+        for up in steps:
+            for across in steps:
+                corner = outwards + across * right + up * top
+                corners.append(corner / np.linalg.norm(corner) if rounded else corner)
+                normals.append(corners[-1] if rounded else outwards)
+                places.append(np.array([(column + 0.5 + 0.5 * across) / 3, (row + 0.5 - 0.5 * up) / 2]))
+        for k in (first + i * (parts + 1) + j for i in range(parts) for j in range(parts)):
+            faces.append((k, k + 1, k + parts + 2, k + parts + 1))
+    return _mesh(name, corners, normals, faces, places)
 
 
 def _cylinder() -> str:
