@@ -23,8 +23,8 @@ from vergence_metric.tracking.request import TrackRequest
 from vergence_rig.rig import default_rig
 
 PHOTOGRAPHS = 12
-PAIRS = 24
 SETTLED = 12  # pairs until the tracker has locked
+PAIRS = SETTLED + 15  # as many are measured as there are from one estimate of the alignment to the next
 REQUESTED_AT = 2  # the pair after which a point is asked for
 STAGES = ("edge", "fovea", "track", "align")
 _BESIDE_PX = (4.0, -3.0)  # of a requested point from the fovea: inside the dead band of the servos
