@@ -21,8 +21,8 @@ from vergence_metric.disparity.shared_search import LocalDisparity
 
 _BLUR_PX = 0.9  # linear interpolation is all but exact on what this leaves
 _REMAP_STEPS = 32  # per pixel
-_ITERATIONS = 6
-_CONVERGED_PX = 0.02  # far below the deviation of any fit; more iterations change no figure on photographs
+_ITERATIONS = 12
+_CONVERGED_PX = 0.01
 _LARGEST_STEP_PX = 3.0
 _LARGEST_SHEAR = 0.4
 _LARGEST_LEAP_PX = 8.0
