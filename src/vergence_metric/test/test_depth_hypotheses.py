@@ -50,18 +50,6 @@ def test_pairs_that_find_nothing_take_the_certainty_away() -> None:
     assert not depths.certain
 
 
-def test_two_that_have_come_together_are_one() -> None:
-    """The eyes turn otherwise than they report, and the target's parallax moves to where a rival was seen last."""
-    depths = hypotheses()
-    for _ in range(10):
-        depths.update([(0.1, 0.6), (0.12, 0.4)])
-    for parallax_rad in (0.104, 0.108, 0.112, 0.115, 0.1175, 0.1185, 0.118):
-        depths.update([(parallax_rad, 0.8)])
-    assert [round(one.parallax_rad, 3) for one in depths.ranked] == [0.118]
-    assert depths.ranked[0].first_rad == pytest.approx(0.1)
-    assert depths.certain
-
-
 def test_a_hypothesis_moves_along_with_the_joints_errors() -> None:
     depths = hypotheses()
     depths.update([(0.1, 0.9), (0.13, 0.1)])

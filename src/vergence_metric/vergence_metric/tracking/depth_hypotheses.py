@@ -2,8 +2,7 @@
 
 A distance is kept as the target's parallax, the angle between both eyes' rays to it, which does not depend on where the
 eyes look. Joint angles of hobby servos shift it by up to a degree when the eyes turn: candidates are assigned to the
-nearest hypothesis within that, and the hypothesis moves along. Two that have come closer to each other than the
-candidates of one pair ever are have become one.
+nearest hypothesis within that, and the hypothesis moves along.
 """
 
 from collections.abc import Sequence
@@ -12,10 +11,9 @@ from dataclasses import dataclass
 _FORGOTTEN = 0.02  # weight below which a hypothesis is dropped
 _MOST = 8
 _LEAD = 2.0  # times the second weight
-_ONE = 0.28  # times the parallax that tells apart: two pixels by default, as far as candidates of a pair are at least
 
 
-@dataclass(eq=False)
+@dataclass
 class Hypothesis:
     """A parallax [rad], the share of recent pairs that speak for it, 0 to 1, and the parallax at which it began."""
 
@@ -73,18 +71,6 @@ class DepthHypotheses:
                 free.remove(mine)
             mine.parallax_rad, mine.weight = parallax_rad, mine.weight + new * probability
             answered = mine if i == 0 else answered
-        for stale in free:
-            self._merge(stale, [one for one in self.ranked if one not in free])
         self.ranked.sort(key=lambda one: -one.weight)
         self.ranked = [one for one in self.ranked[:_MOST] if one.weight >= _FORGOTTEN]
         return answered
-
-    def _merge(self, stale: Hypothesis, seen: Sequence[Hypothesis]) -> None:
-        """Add a hypothesis of which a pair says nothing to the one that this pair has where it is, if there is one."""
-        for one in seen:
-            if abs(one.parallax_rad - stale.parallax_rad) <= _ONE * self._apart_rad:
-                if stale.weight > one.weight:
-                    one.first_rad = stale.first_rad
-                one.weight += stale.weight
-                self.ranked.remove(stale)
-                return
