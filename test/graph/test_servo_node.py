@@ -384,13 +384,19 @@ def test_a_third_servo_on_two_channels_is_refused_with_the_way_out(make_graph: C
         make_graph(pwm_channels=2)
 
 
-def test_joint_states_come_less_often_while_nothing_moves_and_the_pose_before_a_motion_at_once(
-    make_graph: Callable[..., Graph], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def resting_soon(make_graph: Callable[..., Graph], monkeypatch: pytest.MonkeyPatch) -> tuple[Graph, ServoNode]:
+    """A graph whose servo_node lowers its rates as soon as nothing moves, and that node."""
     monkeypatch.setattr(servo_node, "_RESTING_AFTER_S", 0.0)
     graph = make_graph()
-    node = graph.node
-    assert node is not None
+    assert graph.node is not None
+    return graph, graph.node
+
+
+def test_joint_states_come_less_often_while_nothing_moves_and_the_pose_before_a_motion_at_once(
+    resting_soon: tuple[Graph, ServoNode],
+) -> None:
+    graph, node = resting_soon
     graph.until(lambda: not node._updates.fast and not node._reports.fast)
     graph.states.clear()
     graph.command(pan_left=0.3)
@@ -404,12 +410,9 @@ def test_joint_states_come_less_often_while_nothing_moves_and_the_pose_before_a_
 
 
 def test_a_command_that_is_repeated_keeps_servos_at_rest(
-    make_graph: Callable[..., Graph], monkeypatch: pytest.MonkeyPatch
+    resting_soon: tuple[Graph, ServoNode],
 ) -> None:
-    monkeypatch.setattr(servo_node, "_RESTING_AFTER_S", 0.0)
-    graph = make_graph()
-    node = graph.node
-    assert node is not None
+    graph, node = resting_soon
 
     def repeat() -> None:
         graph.command(pan_left=0.3)
