@@ -106,3 +106,15 @@ def test_thresholds_of_verged_apply_from_the_next_pair_on(measurement: PairMeasu
     assert measurement.verged(pair, 1.5, 0.9)
     change(measurement, "verged", enter_rad=0.001)
     assert not measurement.verged(pair, 1.5, 0.9)
+
+
+@pytest.mark.parametrize("pixel", [(640.0, 100.0), (-0.5, 100.0), (100.0, 479.5), (math.nan, 100.0)])
+def test_a_requested_point_outside_the_image_is_named_and_the_target_stays(
+    measurement: PairMeasurement, pair: EdgeMetricResult, pixel: tuple[float, float]
+) -> None:
+    before = locked(measurement, pair, 0.0)
+    measurement.request_track(TrackRequest(8, 0.0, True, pixel))
+    after = measurement.track(pair, 2.0, AT_REST, None)
+    assert (after.track_id, after.goal_id) == (before.track_id, before.goal_id)
+    assert "the point of goal 8" in measurement.unmet_request
+    assert "must be in the 640x480 image" in measurement.unmet_request

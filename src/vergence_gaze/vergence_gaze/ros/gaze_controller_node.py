@@ -192,6 +192,7 @@ class GazeControllerNode(Node):
         report, (state_read, fixation_read, markers_read) = command.report, self._read
         self._command.update(command.joints_rad, now_s)
         if command.track_request is not None:
+            self._read_cameras()
             self._track_requests.publish(convert.track_request(command.track_request, self._images))
         if command.object_request is not None:
             self._object_requests.publish(convert.object_request(command.object_request, now_s))

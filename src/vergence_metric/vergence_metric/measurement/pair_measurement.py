@@ -196,8 +196,12 @@ class PairMeasurement:
                 height, width = edge.right_grey.shape
                 request = replace(request, pixel=edge.alignment.aligned(*request.pixel, width, height))
             pair = self._stored(request, seen, camera, edge.alignment)
+            (x_px, y_px), (height, width) = request.pixel, edge.left_grey.shape
             if pair is None:
                 self.unmet_request = f"no pair is stored for goal {request.goal_id}, stamp {request.stamp_s:.3f} s"
+            elif not (0.0 <= x_px <= width - 1 and 0.0 <= y_px <= height - 1):
+                place = f"({x_px:.1f}, {y_px:.1f}) px must be in the {width}x{height} image"
+                self.unmet_request = f"the point of goal {request.goal_id}: {place}"
             else:
                 tracker.request(request, pair)
 

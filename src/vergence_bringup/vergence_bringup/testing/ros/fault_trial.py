@@ -10,13 +10,13 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from vergence_bringup.testing.ros.faults import Fault
 from vergence_bringup.testing.ros.faulty_head import FaultyHead
 from vergence_bringup.testing.textured_wall import TexturedWall
+from vergence_common.executor import make_executor
 from vergence_gaze.ros.gaze_controller_node import GazeControllerNode
 from vergence_metric.ros.edge_metric_node import EdgeMetricNode
 from vergence_msgs.msg import GazeState
@@ -63,7 +63,7 @@ class FaultTrial:
     def __init__(self, domain_id: int | None = None) -> None:
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain_id)
-        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor = make_executor(self._context)
         self._statuses: dict[str, DiagnosticStatus] = {}
         self._arrived_s: dict[str, float] = {}
         self.verged = False
