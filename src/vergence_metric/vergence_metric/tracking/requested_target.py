@@ -67,7 +67,7 @@ def weigh_depths(
     target: Target, depths: DepthHypotheses, disparity: Disparity, left_px: Pixel, pair: StoredPair
 ) -> bool:
     """Add what a pair says of the target's distance; returns whether it is the likeliest by now."""
-    answered = depths.update(parallax_shares(disparity, left_px, pair))
+    answered = depths.update(parallax_shares(disparity, left_px, pair), vergence_of(pair.views))
     if depths.best is not None:
         target.parallax_rad = depths.best.parallax_rad
     return answered is not None and answered is depths.best

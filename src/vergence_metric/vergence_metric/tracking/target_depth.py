@@ -8,7 +8,7 @@ from vergence_metric.tracking.depth_hypotheses import DepthHypotheses
 from vergence_metric.tracking.eye_view import EyeView, Pixel
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair
-from vergence_metric.tracking.tracked_target import disparity_of_parallax, parallax
+from vergence_metric.tracking.tracked_target import disparity_of_parallax, parallax, vergence_of
 
 
 class TargetDepth:
@@ -50,7 +50,7 @@ class TargetDepth:
 
     def _add(self, disparity: Disparity, pair: StoredPair, point: Pixel) -> bool:
         """Weigh the hypotheses by a disparity; returns whether it is that of the likeliest one."""
-        answered = self._hypotheses.update(parallax_shares(disparity, point, pair))
+        answered = self._hypotheses.update(parallax_shares(disparity, point, pair), vergence_of(pair.views))
         best = self._hypotheses.best
         if best is not None and not abs(best.parallax_rad - self.parallax_rad) <= self._apart_rad:
             self.parallax_rad = best.parallax_rad
