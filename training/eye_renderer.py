@@ -4,6 +4,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_sim.unit_meshes import UnitMeshes
+
 Image = NDArray[np.uint8]
 
 
@@ -22,6 +24,7 @@ class EyeRenderer:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._unit_meshes = UnitMeshes(model)
         self.look_with("left")
 
     def look_with(self, eye: str) -> None:
@@ -44,6 +47,7 @@ class EyeRenderer:
             mujoco.mjtCatBit.mjCAT_ALL,
             self._scene,
         )
+        self._unit_meshes.put_in(self._scene)
 
     def _pixels(self) -> Image:
         width, height = self._size_px

@@ -66,7 +66,7 @@ def pixels_of(simulator, eye, name):
     scene = renderer._scene
     before = scene.flags.copy()
     scene.flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = scene.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 1
-    codes = renderer.render(simulator._data, eye)[:, :, ::-1].astype(int) @ np.array([1, 256, 65536])
+    codes = renderer.render(simulator._data, eye)[:, :, :3].astype(int) @ np.array([1, 256, 65536])
     scene.flags[:] = before
     body = simulator._model.body(name).id
     ids = [

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vergence_sim.surfaces import Image
-
-FACES = ("right", "left", "up", "down", "front", "back")
-"""Of MuJoCo's cube textures, in the order of `ModelBuilder.wrap`: what looks along +x, -x, +y, -y, +z, -z."""
+from vergence_sim.unit_meshes import FACES, SHEET, SHEET_KINDS, SLICES, unit_meshes
 
 # Seen from outside with z up, MuJoCo shows the images of the first three on their sides or upside down.
 _UPRIGHT = {"right": cv2.ROTATE_90_COUNTERCLOCKWISE, "left": cv2.ROTATE_90_CLOCKWISE, "up": cv2.ROTATE_180}
@@ -27,6 +25,8 @@ class ModelBuilder:
         self._files: dict[str, bytes] = {}
         self._assets: list[str] = []
         self._bodies: list[str] = []
+        self._wraps: dict[str, list[Image]] = {}
+        self._materials: set[str] = set()
         self._shapes = 0
 
     def flat(self, name: str, image: Image) -> str:
@@ -35,17 +35,9 @@ class ModelBuilder:
         self._assets.append(f'<material name="{name}" texture="{name}" texrepeat="1 1" specular="0.02"/>')
         return name
 
-    def wrap(self, name: str, images: list[Image], specular: float = 0.1) -> str:
-        """Add a texture around a box, cylinder or ellipsoid: six square images as in FACES, upright from outside."""
-        turned = [
-            np.asarray(cv2.rotate(image, _UPRIGHT[face]), np.uint8) if face in _UPRIGHT else image
-            for face, image in zip(FACES, images, strict=True)
-        ]
-        files = " ".join(
-            f'file{face}="{self._file(f"{name}_{face}", image)}"' for face, image in zip(FACES, turned, strict=True)
-        )
-        self._assets.append(f'<texture name="{name}" type="cube" {files}/>')
-        self._assets.append(f'<material name="{name}" texture="{name}" specular="{specular}"/>')
+    def wrap(self, name: str, images: list[Image]) -> str:
+        """Name a texture around boxes, cylinders or ellipsoids: six square images as in FACES, upright from outside."""
+        self._wraps[name] = images
         return name
 
     def shape(
@@ -61,7 +53,7 @@ class ModelBuilder:
         """Return a geom: MuJoCo's kind and half sizes, a texture's name or a colour RGB, Euler angles x y z."""
         self._shapes += 1
         if isinstance(material, str):
-            look = f'material="{material}"' if self.textured else 'rgba="0.5 0.5 0.5 1"'
+            look = f'material="{self._material(kind, material)}"' if self.textured else 'rgba="0.5 0.5 0.5 1"'
         else:
             look = f'rgba="{_text(material)} 1"'
         return (
@@ -84,19 +76,47 @@ class ModelBuilder:
         xml = f"""<mujoco model="room"><compiler angle="radian"/>
         <visual>
           <global offwidth="{size_px[0]}" offheight="{size_px[1]}"/>
-          <quality offsamples="{samples}" shadowsize="0" numslices="14" numstacks="8" numquads="1"/>
+          <quality offsamples="{samples}" shadowsize="0" numslices="{SLICES}" numstacks="8" numquads="1"/>
           <map znear="0.002" zfar="20"/>
           {headlight}
         </visual>
         <statistic extent="1" center="0 0 1"/>
-        <asset>{"".join(self._assets) if self.textured else ""}</asset>
+        <asset>{"".join([*unit_meshes(), *self._assets]) if self.textured else ""}</asset>
         <worldbody>{lights}{"".join(self._bodies)}</worldbody></mujoco>"""
         model = mujoco.MjModel.from_xml_string(xml, self._files)
         # The pictures stay in MuJoCo's cache and in the model's compiler, as large as the model each: drop both.
         mujoco.mj_clearCache(mujoco.mj_getCache())
         # A builder and its room refer to one another: the collector frees them late.
         self._files.clear()
+        self._wraps.clear()
         return copy.copy(model)
+
+    def _material(self, kind: str, name: str) -> str:
+        """Return the material of a texture on a kind of shape; makes that of a wrapped one when it is first needed.
+
+        A box's or ball's is one flat texture of its six sides: Mesa draws a cube texture in more than twice the time.
+        """
+        images = self._wraps.get(name)
+        if images is None:
+            return name
+        material = f"{name}_sheet" if kind in SHEET_KINDS else name
+        if material not in self._materials:
+            self._materials.add(material)
+            if kind in SHEET_KINDS:
+                faces = dict(zip(FACES, images, strict=True))
+                sheet = np.vstack([np.hstack([faces[face] for face in row]) for row in SHEET])
+                texture = f'type="2d" file="{self._file(material, sheet)}"'
+            else:
+                files = {
+                    face: np.asarray(cv2.rotate(image, _UPRIGHT[face]), np.uint8) if face in _UPRIGHT else image
+                    for face, image in zip(FACES, images, strict=True)
+                }
+                texture = 'type="cube" ' + " ".join(
+                    f'file{face}="{self._file(f"{name}_{face}", image)}"' for face, image in files.items()
+                )
+            self._assets.append(f'<texture name="{material}" {texture}/>')
+            self._assets.append(f'<material name="{material}" texture="{material}" specular="0.1"/>')
+        return material
 
     def _file(self, name: str, image: Image) -> str:
         if self.textured:

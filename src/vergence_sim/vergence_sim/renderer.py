@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_sim.model_builder import HIDDEN_GROUP
+from vergence_sim.unit_meshes import UnitMeshes
 
 Image = npt.NDArray[np.uint8]
 
@@ -28,7 +29,7 @@ class RenderError(RuntimeError):
 
 
 class EyeRenderer:
-    """Renders named cameras of a model as (h, w, 3) BGR uint8, each in its own size, `sizes_px` (width, height)."""
+    """Renders named cameras of a model as (h, w, 4) RGBA uint8, each in its own size, `sizes_px` (width, height)."""
 
     def __init__(self, model: Any, sizes_px: Mapping[str, tuple[int, int]]) -> None:
         width_px, height_px = (max(sides) for sides in zip(*sizes_px.values(), strict=True))
@@ -58,6 +59,8 @@ class EyeRenderer:
         self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZERONEAR
         self._viewports = {camera: mujoco.MjrRect(0, 0, *size) for camera, size in sizes_px.items()}
         self._views: dict[str, tuple[bytes, Image]] = {}
+        self._unit_meshes = UnitMeshes(model)
+        self._pixels = np.empty((height_px, width_px, 4), np.uint8)
 
     def render(self, data: Any, camera: str) -> Image:
         """Return the view of a camera; the same array again, not to be changed, while nothing has moved."""
@@ -87,6 +90,7 @@ class EyeRenderer:
                 self._model, data, self._options, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
             )
             groups[:] = visible
+        self._unit_meshes.put_in(self._scene)
 
     def _drop_stencil(self) -> None:
         """Give the frame a depth buffer alone: with a stencil, which only reflections need, it is twice as large."""
@@ -98,17 +102,15 @@ class EyeRenderer:
         gl.glFramebufferRenderbuffer(_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_RENDERBUFFER, buffer)
 
     def _read(self, viewport: Any) -> Image:
-        """Return the pixels just drawn (h, w, 3) BGR, rows upwards."""
+        """Return the pixels just drawn (h, w, 4) RGBA, rows upwards, until the next are read."""
         if self._mjr.offSamples:
             rgb = np.empty((viewport.height, viewport.width, 3), np.uint8)
             mujoco.mjr_readPixels(rgb, None, viewport, self._mjr)
-            return np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), np.uint8)
+            return np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2RGBA), np.uint8)
         # In the format in which they are stored: Mesa takes ten times as long to turn them into RGB.
-        rgba = np.empty((viewport.height, viewport.width, 4), np.uint8)
-        self._gl.glReadPixels(
-            0, 0, viewport.width, viewport.height, _GL_RGBA, _GL_UNSIGNED_BYTE, rgba.ctypes.data_as(ctypes.c_void_p)
-        )
-        return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2BGR), np.uint8)
+        size, pixels = (viewport.width, viewport.height), self._pixels
+        self._gl.glReadPixels(0, 0, *size, _GL_RGBA, _GL_UNSIGNED_BYTE, pixels.ctypes.data_as(ctypes.c_void_p))
+        return pixels.reshape(-1)[: 4 * size[0] * size[1]].reshape(size[1], size[0], 4)
 
     def close(self) -> None:
         """Free the context and its buffers; idempotent."""

@@ -11,7 +11,7 @@ from vergence_rig.head_bodies import BASE, CAMERAS, EYES
 from vergence_rig.head_mjcf import camera_mjcf, mjcf_bodies
 from vergence_rig.rig import Rig
 from vergence_sim.memory import discard_pages, return_free_memory
-from vergence_sim.model_builder import FACES, HIDDEN_GROUP, ModelBuilder
+from vergence_sim.model_builder import HIDDEN_GROUP, ModelBuilder
 from vergence_sim.parameters import TARGETS, SimParameters
 from vergence_sim.persons import BOARD_HALF_M, PERSONS
 from vergence_sim.pictures import book_cover, cube_faces, look_alike_faces
@@ -19,6 +19,7 @@ from vergence_sim.portraits import portrait
 from vergence_sim.room import Room
 from vergence_sim.surfaces import Image, cloth, shaded, wood
 from vergence_sim.true_gaze import fovea_sites
+from vergence_sim.unit_meshes import FACES
 
 HEAD_HEIGHT_M = 1.15
 STAND = "stand"
