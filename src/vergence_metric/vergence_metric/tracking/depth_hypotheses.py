@@ -15,7 +15,7 @@ _FORGOTTEN = 0.02  # weight below which a hypothesis is dropped
 _MOST = 8
 _LEAD = 2.0  # times the second weight
 _PLAY_RAD = 0.02  # that servos may have in all
-_SIGMAS, _SAME = 4.0, 1 / 3  # in the least difference of two distances: of a shift, and how near a candidate must be
+_SIGMAS, _SAME = 4.0, 1 / 3  # in the largest shift: its standard deviations, and how near a candidate must be
 
 
 @dataclass(eq=False)
@@ -32,7 +32,8 @@ class DepthHypotheses:
 
     Args:
         memory: share of the old weights that a pair leaves.
-        apart_rad: parallaxes that differ by less may be the same.
+        apart_rad: the largest shift of all parallaxes that the joints' reports do not explain; those that differ by less
+            than a third of it are the same.
         share: of the recent pairs that must speak for the likeliest for it to be certain.
     """
 

@@ -180,7 +180,8 @@ class TrackerParameters(Parameters):
     )
     depth_apart_rad: float = parameter(
         0.013,
-        "difference in parallax from which two possible distances of a requested target are told apart",
+        "largest shift of a requested target's possible parallaxes, all alike, that the joints' reports do not explain; a "
+        "third of it tells two distances apart",
         unit="rad",
         minimum=0.001,
         maximum=0.1,
