@@ -164,6 +164,16 @@ def _zero_stamp(message: JointState) -> list[JointState]:
     return [message]
 
 
+def _frozen_reports(head: FaultyHead) -> None:
+    held = head.joints_rad.tolist()
+
+    def report(message: JointState) -> list[JointState]:
+        message.position = held
+        return [message]
+
+    head.report = report
+
+
 def _stuck(head: FaultyHead) -> None:
     head.follows = False
 
@@ -244,5 +254,6 @@ FAULTS: tuple[Fault, ...] = (
     Fault("joint_states with stamps at zero", _joints(_zero_stamp), _JOINTS, "the stamp must be set", HOLDS),
     Fault("joint_states 0.3 s late", _joints(_shifted(-0.3)), _GAZE, "joint_states are late", HOLDS),
     Fault("joint_states 1 s in the future", _joints(_shifted(1.0)), _JOINTS, "must not be in the future", HOLDS),
-    Fault("joint_states frozen, or a stuck servo", _stuck, _GAZE, "do not follow their commands", HOLDS, True),
+    Fault("a stuck servo", _stuck, _GAZE, "do not follow their commands", HOLDS, True),
+    Fault("joint_states frozen, servos turn", _frozen_reports, _GAZE, "do not follow their commands", HOLDS, True),
 )
