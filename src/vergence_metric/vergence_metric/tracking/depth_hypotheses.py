@@ -32,8 +32,8 @@ class DepthHypotheses:
 
     Args:
         memory: share of the old weights that a pair leaves.
-        apart_rad: the largest shift of all parallaxes that the joints' reports do not explain; those that differ by less
-            than a third of it are the same.
+        apart_rad: the largest shift of all parallaxes that the joints' reports do not explain; those that differ by
+            less than a third of it are the same.
         share: of the recent pairs that must speak for the likeliest for it to be certain.
     """
 

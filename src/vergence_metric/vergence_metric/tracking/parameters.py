@@ -180,8 +180,8 @@ class TrackerParameters(Parameters):
     )
     depth_apart_rad: float = parameter(
         0.013,
-        "largest shift of a requested target's possible parallaxes, all alike, that the joints' reports do not explain; a "
-        "third of it tells two distances apart",
+        "largest shift of a requested target's possible parallaxes, all alike, that the joints' reports do not "
+        "explain; a third of it tells two distances apart",
         unit="rad",
         minimum=0.001,
         maximum=0.1,
