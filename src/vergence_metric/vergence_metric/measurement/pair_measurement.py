@@ -16,6 +16,7 @@ from vergence_metric.measurement.edge_metric import AlignedPair, EdgeMetric, Edg
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.tracking.eye_view import EyeView, eye_views
+from vergence_metric.tracking.locking_tracker import is_inside
 from vergence_metric.tracking.motion.awaited_motion import AwaitedMotion
 from vergence_metric.tracking.protocol import Tracker
 from vergence_metric.tracking.registry import make_tracker
@@ -196,10 +197,10 @@ class PairMeasurement:
                 height, width = edge.right_grey.shape
                 request = replace(request, pixel=edge.alignment.aligned(*request.pixel, width, height))
             pair = self._stored(request, seen, camera, edge.alignment)
-            (x_px, y_px), (height, width) = request.pixel, edge.left_grey.shape
             if pair is None:
                 self.unmet_request = f"no pair is stored for goal {request.goal_id}, stamp {request.stamp_s:.3f} s"
-            elif not (0.0 <= x_px <= width - 1 and 0.0 <= y_px <= height - 1):
+            elif not is_inside(request.pixel, pair.left):
+                (x_px, y_px), (height, width) = request.pixel, pair.left.shape
                 place = f"({x_px:.1f}, {y_px:.1f}) px must be in the {width}x{height} image"
                 self.unmet_request = f"the point of goal {request.goal_id}: {place}"
             else:

@@ -92,7 +92,10 @@ class DepthHypotheses:
         return off.index(min(off)) if off and min(off) <= _SAME * self._apart_rad else None
 
     def _shift(self, candidates: Sequence[tuple[float, float]], vergence_rad: float) -> float:
-        """Return the likeliest shift of all parallaxes since the pair before [rad], by what the joints report."""
+        """Return the likeliest shift of all parallaxes in this pair [rad], by what the joints report.
+
+        All that they have reported since the likeliest hypothesis was last seen counts: nothing has explained it yet.
+        """
         if not candidates:
             return 0.0
         if not self.ranked:
