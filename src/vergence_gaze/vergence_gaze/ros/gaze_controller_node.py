@@ -102,6 +102,14 @@ class GazeControllerNode(Node):
         period_s = 1.0 / values.control_rate_hz
         self._cycle_timer = TwoRates(self, self._cycle, period_s, max(period_s, _RESTING_PERIOD_S))
 
+    def destroy_node(self) -> None:
+        """Destroy the subscriptions and action servers, too, which rclpy's node does not."""
+        for info in self._camera_infos:
+            info.close()
+        for server in self._servers:
+            server.destroy()
+        super().destroy_node()
+
     @property
     def resolution_rad(self) -> list[float]:
         """The smallest step of each joint [rad] in the controller's model of the servos."""

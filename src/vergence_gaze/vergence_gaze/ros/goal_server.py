@@ -35,6 +35,10 @@ class GoalServer:
             cancel_callback=lambda handle: CancelResponse.ACCEPT,
         )
 
+    def destroy(self) -> None:
+        """Destroy the action's server: its node does not when it is destroyed."""
+        self._server.destroy()
+
     def forward_cancels(self, now_s: float) -> None:
         """Cancel the goals whose clients have asked for it."""
         for goal_id, handle in list(self._goals.items()):

@@ -55,6 +55,11 @@ class MetricNode(Node):
         """End the measuring thread."""
         self._worker.close()
 
+    def destroy_node(self) -> None:
+        """Destroy the subscriptions, too, that rclpy's node does not know of."""
+        self._stereo.close()
+        super().destroy_node()
+
     def _output(self, qos: QosWatch, kind: Any, topic: str, profile: QoSProfile = STATE_QOS) -> Publisher:
         """Return a publisher of something that is measured."""
         self._outputs.append(qos.create_publisher(kind, topic, profile, matched=self._on_matched))

@@ -102,8 +102,11 @@ class StereoInput:
 
     def pause(self) -> None:
         """Receive nothing until `resume`; images that this node shares with others are received all the same."""
-        if self._images is not None and not self._local:
-            return
+        if self._images is None or self._local:
+            self.close()
+
+    def close(self) -> None:
+        """End every subscription."""
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         self._subscriptions.clear()
