@@ -31,7 +31,9 @@ def node(graph: Any, monkeypatch: pytest.MonkeyPatch) -> GazeControllerNode:
         publisher.publish(JointState(header=header, name=list(JOINT_NAMES), position=[0.0, 0.1, 0.0]))
 
     graph.client.create_timer(0.02, report)
-    graph.wait_until(lambda: node._newest is not None and node._newest.vergence_rad == pytest.approx(0.1), "joints")
+    graph.wait_until(
+        lambda: node._newest is not None and node._newest.report.vergence_rad == pytest.approx(0.1), "joints"
+    )
     return node
 
 
@@ -41,7 +43,7 @@ def read(node: GazeControllerNode) -> Callable[[], bool]:
 
 def test_measurements_are_subscribed_while_a_goal_needs_them(graph: Any, node: GazeControllerNode) -> None:
     graph.wait_until(lambda: not any(node.count_subscribers(topic) for topic in MEASURED), "nothing is read")
-    assert not node._newest.images_missing  # type: ignore[union-attr]
+    assert not node._newest.report.images_missing  # type: ignore[union-attr]
     client = ActionClient(graph.client, LookAt, "gaze/look_at")
     graph.wait_until(client.server_is_ready, "the action")
     goal = LookAt.Goal(kind=LookAt.Goal.PIXEL, left_x_px=320.0, left_y_px=240.0, time_limit_s=60.0)

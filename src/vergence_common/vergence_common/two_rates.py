@@ -18,7 +18,8 @@ class TwoRates:
     ) -> None:
         self._periods_ns = {True: round(1e9 * fast_s), False: round(1e9 * slow_s)}
         self._callback, self._clock = callback, clock or node.get_clock()
-        self._called_ns: int | None = None
+        self.called_ns: int | None = None
+        """The clock's time at the newest call [ns]."""
         self.fast = True
         """Which period it has."""
         self.timer = node.create_timer(fast_s, self._call, clock=self._clock)
@@ -35,8 +36,8 @@ class TwoRates:
 
     def _call(self) -> None:
         now_ns = self._clock.now().nanoseconds
-        if now_ns == self._called_ns:
+        if now_ns == self.called_ns:
             self.timer.reset()
             return
-        self._called_ns = now_ns
+        self.called_ns = now_ns
         self._callback()

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vergence_gaze.estimation.imm_filter import ImmFilter
-from vergence_gaze.estimation.kalman import Measurement
+from vergence_gaze.estimation.imm_filter import ImmWeights
+from vergence_gaze.estimation.kalman import KalmanModels, Measurement
 from vergence_gaze.estimation.target_filter import TargetFilter
 
 ROWS = np.array([[1.0, -0.5, 0.0], [1.0, 0.5, 0.0], [0.0, 0.0, 1.0]])
@@ -176,16 +176,17 @@ def test_joint_sigmas_are_of_the_joints() -> None:
 
 
 def test_weights_follow_what_is_seen() -> None:
-    calm_then_wild = ImmFilter(1.0, 8.0)
-    state = np.zeros(6)
-    calm_then_wild.initialise(state, np.eye(6) * 1e-4)
+    models, mixture = KalmanModels((1.0, 8.0), (0.0, 0.0)), ImmWeights()
+    models.covariances = np.array([np.eye(6) * 1e-4] * 2)
 
     def see(version_rad: float, time_s: float) -> float:
-        calm_then_wild.predict(INTERVAL_S)
-        measurement = seen((version_rad, 0.0, 0.0), time_s, np.zeros(3))
-        calm_then_wild.update(calm_then_wild.innovations(measurement, time_s))
-        assert calm_then_wild.weights.sum() == pytest.approx(1.0)
-        return float(calm_then_wild.weights[1])
+        models.states, models.covariances = mixture.mixed(models.states, models.covariances, INTERVAL_S)
+        models.predict(INTERVAL_S)
+        innovations = models.innovations(seen((version_rad, 0.0, 0.0), time_s, np.zeros(3)), time_s)
+        models.update(innovations)
+        mixture.update(innovations.losses)
+        assert sum(mixture.weights) == pytest.approx(1.0)
+        return mixture.weights[1]
 
     for i in range(1, 20):
         weight = see(0.0, i * INTERVAL_S)

@@ -58,3 +58,12 @@ def test_equal_cameras_without_distortion_are_left_as_they_are() -> None:
     assert not left.is_same
     assert right.is_same
     assert left.to_ideal([(325.5, 239.5)])[0] == pytest.approx((319.5, 239.5))
+
+
+def test_one_pixel_is_undistorted_as_many_are() -> None:
+    rig = _rig()
+    aside = replace(rig, left_mount=replace(rig.left_mount, yaw_rad=0.45, pitch_rad=0.45))
+    for head in (rig, aside, default_rig()):
+        for image in eye_images(head, (CameraModel(head.left_camera), CameraModel(head.right_camera))):
+            for pixel in ((0.0, 0.0), (320.0, 240.0), (639.0, 12.5), (-5000.0, 5000.0)):
+                assert image.undistorted(*pixel) == pytest.approx(tuple(image.undistort([pixel])[0]), nan_ok=True)

@@ -32,6 +32,7 @@ class EyeImage:
     def __init__(self, camera: CameraModel, ideal: CameraModel, camera_from_ideal: Array) -> None:
         self.camera, self.ideal = camera, ideal
         self._turn = camera_from_ideal
+        self._columns = tuple(camera_from_ideal.T.tolist())
         self.is_same = camera.equals(ideal) and bool(np.allclose(camera_from_ideal, np.eye(3), atol=1e-9))
         """True where the camera's image is the ideal one."""
 
@@ -55,6 +56,14 @@ class EyeImage:
     def undistort(self, pixels: npt.ArrayLike) -> Array:
         """Return normalised coordinates (N, 2), x right, y down, in the ideal camera of the camera's pixels (N, 2)."""
         return self.ideal.undistort(self.to_ideal(pixels))
+
+    def undistorted(self, u_px: float, v_px: float) -> tuple[float, float]:
+        """Return what `undistort` does of one pixel, without the cost of arrays."""
+        x, y = self.camera.undistorted(u_px, v_px)
+        if self.is_same:
+            return x, y
+        right, down, forward = (x * one + y * two + three for one, two, three in self._columns)
+        return (right / forward, down / forward) if forward > 0.0 else (math.nan, math.nan)
 
     def distort(self, normalised: npt.ArrayLike) -> Array:
         """Return the camera's pixels (N, 2) of normalised coordinates (N, 2) in the ideal camera."""

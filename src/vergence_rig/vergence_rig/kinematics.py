@@ -31,6 +31,7 @@ from vergence_rig.geometry import (
 from vergence_rig.rig import EyeMount, Rig
 
 Array = npt.NDArray[np.float64]
+Place = tuple[float, float, float]
 
 _STEPS = 12
 _CONVERGED_RAD = 1e-12
@@ -60,7 +61,7 @@ class _Eye:
         self.axis_x, self.axis_y, self.axis_z = axis.tolist()
         self.lens_x, self.lens_y, self.lens_z = lens.tolist()
 
-    def lens_on_bar(self, pan_rad: float) -> tuple[float, float, float]:
+    def lens_on_bar(self, pan_rad: float) -> Place:
         """Return the lens in the bar's frame [m]."""
         cos, sin = math.cos(pan_rad), math.sin(pan_rad)
         return (
@@ -120,7 +121,22 @@ class Kinematics:
 
     def lens(self, left: bool, pan_rad: float, tilt_rad: float) -> Array:
         """Return where an eye's lens is (3,) [m]."""
-        return np.array(self._to_rig(*self._eyes[not left].lens_on_bar(pan_rad), 1.0, tilt_rad))
+        return np.array(self.lens_place(left, pan_rad, tilt_rad))
+
+    def lens_place(self, left: bool, pan_rad: float, tilt_rad: float) -> Place:
+        """Return what `lens` does as plain numbers."""
+        return self._to_rig(*self._eyes[not left].lens_on_bar(pan_rad), 1.0, tilt_rad)
+
+    def seen_direction(self, pan_rad: float, tilt_rad: float, right: float, down: float, forward: float) -> Place:
+        """Return a direction of an eye's optical frame in rig_base, of the same length, as plain numbers."""
+        x, y, z = forward, -right, -down
+        if self.pitch_rad:
+            cos, sin = math.cos(self.pitch_rad), math.sin(self.pitch_rad)
+            x, z = cos * x + sin * z, -sin * x + cos * z
+        cos, sin = math.cos(pan_rad), math.sin(pan_rad)
+        x, y = cos * x - sin * y, sin * x + cos * y
+        cos, sin = math.cos(tilt_rad), math.sin(tilt_rad)
+        return cos * x + sin * z, y, -sin * x + cos * z
 
     def pose_jacobian(self, left: bool, pan_rad: float, tilt_rad: float) -> tuple[Array, Array]:
         """Return how an eye's pose changes with its pan and the tilt.
@@ -281,7 +297,7 @@ class Kinematics:
                 return False
         return True
 
-    def _to_rig(self, x: float, y: float, z: float, w: float, tilt_rad: float) -> tuple[float, float, float]:
+    def _to_rig(self, x: float, y: float, z: float, w: float, tilt_rad: float) -> Place:
         """Return a homogeneous point of the bar's frame, whose origin is on the tilt axis, in rig_base."""
         cos, sin = math.cos(tilt_rad), math.sin(tilt_rad)
         return cos * x + sin * z + w * self._tilt_axis_x, y, -sin * x + cos * z + w * self._tilt_axis_z

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -181,14 +182,15 @@ class GazeController:
         """
         self.observe(observations, now_s)
         steering, history = self._steering, self._perception.history
+        report = partial(steering.report, now_s)
         sending = self._enabled and (steering.active or now_s < self._send_until_s)
         if not math.isfinite(now_s):
-            return Command(None, steering.report(now_s), self._goals.pop_outcomes())
+            return Command(None, report, self._goals.pop_outcomes())
         last_sent = self._command.angles_rad if sending else None
         fault = self._feedback.update(now_s, history, last_sent, steering.driven, joint_fault)
         self._goals.update_feedback(fault, now_s, self._p)
         if not history.known:
-            return Command(None, steering.report(now_s), self._goals.pop_outcomes())
+            return Command(None, report, self._goals.pop_outcomes())
         command = self._command.angles_rad
         if command is None or not sending:
             command = self._start_from_joints(now_s)
@@ -203,7 +205,7 @@ class GazeController:
             self._update_goal(now_s, sent)
         joints_rad = np.array(self._described.joint_angles(sent.tolist())) if sending else None
         outcomes, requests = self._goals.pop_outcomes(), steering.requests
-        return Command(joints_rad, steering.report(now_s), outcomes, requests.pop(), requests.pop_object())
+        return Command(joints_rad, report, outcomes, requests.pop(), requests.pop_object())
 
     def rests(self, now_s: float) -> bool:
         """Return whether a step would command nothing and end no goal: `observe` is then enough in most cycles."""

@@ -77,10 +77,15 @@ class Command:
     """
 
     joints_rad: Array | None
-    report: GazeReport
+    make_report: Callable[[], GazeReport]
     outcomes: tuple[Outcome, ...]
     track_request: TrackRequest | None = None
     object_request: ObjectRequest | None = None
+
+    @cached_property
+    def report(self) -> GazeReport:
+        """The state after the cycle, made when it is first read, before the next cycle: most have no reader."""
+        return self.make_report()
 
 
 _CLAIM_S = 0.6  # without results of images, after which eyes are no longer said to be verged

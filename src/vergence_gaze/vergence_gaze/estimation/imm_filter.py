@@ -9,8 +9,6 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from vergence_gaze.estimation.kalman import Innovation, KalmanFilter, Measurement
-
 Array = npt.NDArray[np.float64]
 
 _CALM_FOR_S = 2.0
@@ -18,67 +16,59 @@ _MANOEUVRES_FOR_S = 0.3
 _LEAST_WEIGHT = 1e-3
 
 
-class ImmFilter:
-    """Two models of constant velocity, calm and manoeuvring, with their weights (2,)."""
+class ImmWeights:
+    """The weights of the calm and the manoeuvring model; what they combine is (2, 6) and (2, 6, 6)."""
 
-    def __init__(self, calm_rad_s2: float, manoeuvre_rad_s2: float) -> None:
-        self.modes = (KalmanFilter(calm_rad_s2, 0.0), KalmanFilter(max(calm_rad_s2, manoeuvre_rad_s2), 0.0))
-        self.weights = _normalised(np.array([1.0, 0.0]))
+    def __init__(self) -> None:
+        self.reset((1.0, 0.0))
 
-    def initialise(self, state: Array, covariance: Array, weights: tuple[float, float] = (1.0, 0.0)) -> None:
-        """Start both models at a state (6,) with its covariance (6, 6)."""
-        for mode in self.modes:
-            mode.state, mode.covariance = state.copy(), covariance.copy()
-        self.weights = _normalised(np.array(weights))
+    def reset(self, weights: tuple[float, float]) -> None:
+        """Start with these weights."""
+        self.weights = _normalised(*weights)
 
-    def combined(self) -> tuple[Array, Array]:
+    def combined(self, states: Array, covariances: Array) -> tuple[Array, Array]:
         """Return mean (6,) and covariance (6, 6) of both models together."""
-        return self._moments(self.weights)
+        first, second = self.weights
+        apart = states[0] - states[1]
+        covariance = first * covariances[0] + second * covariances[1]
+        return first * states[0] + second * states[1], covariance + first * second * (apart[:, None] * apart)
 
-    def predict(self, duration_s: float) -> None:
-        """Predict `duration_s` ahead: the longer, the likelier that the target has begun or ended a manoeuvre."""
+    def mixed(self, states: Array, covariances: Array, duration_s: float) -> tuple[Array, Array]:
+        """Return where both models start from, for a prediction over `duration_s`, and weight them for its end.
+
+        The longer it is, the likelier that the target has begun or ended a manoeuvre.
+        """
         begins, ends = 1.0 - math.exp(-duration_s / _CALM_FOR_S), 1.0 - math.exp(-duration_s / _MANOEUVRES_FOR_S)
-        switch = np.array([[1.0 - begins, begins], [ends, 1.0 - ends]])
-        # Column j: from where a target that is now in mode j came.
-        origins = switch * self.weights[:, None]
-        weights = origins.sum(axis=0)
-        origins = origins / weights
-        starts = [self._moments(origins[:, j]) for j in range(2)]
-        for mode, (state, covariance) in zip(self.modes, starts, strict=True):
-            mode.state, mode.covariance = state, covariance
-            mode.predict(duration_s)
-        self.weights = _normalised(weights)
+        calm, manoeuvring = self.weights
+        # How likely a target that is in each mode now was calm before.
+        calm_now = (1.0 - begins) * calm + ends * manoeuvring
+        shares = (1.0 - begins) * calm / calm_now, begins * calm / (1.0 - calm_now)
+        apart = states[0] - states[1]
+        spread = apart[:, None] * apart
+        self.weights = _normalised(calm_now, 1.0 - calm_now)
+        return (
+            np.stack([share * states[0] + (1.0 - share) * states[1] for share in shares]),
+            np.stack([s * covariances[0] + (1.0 - s) * (covariances[1] + s * spread) for s in shares]),
+        )
 
-    def innovations(self, measurement: Measurement, now_s: float) -> tuple[Innovation, Innovation]:
-        """Return the innovation of a measurement in both models."""
-        calm, manoeuvring = self.modes
-        return calm.innovation(measurement, now_s), manoeuvring.innovation(measurement, now_s)
+    def loss(self, losses: Array) -> float:
+        """Return the mixture's negative logarithm of the likelihood from that of each model (2,)."""
+        first, second = losses.tolist()
+        least = min(first, second)
+        likelihoods = math.exp(least - first), math.exp(least - second)
+        return least - math.log(self.weights[0] * likelihoods[0] + self.weights[1] * likelihoods[1] + 1e-12)
 
-    def negative_log_likelihood(self, innovations: tuple[Innovation, Innovation]) -> float:
-        """Return the negative logarithm of the mixture's likelihood, without its constant term."""
-        losses = np.array([innovation.negative_log_likelihood for innovation in innovations])
-        least = float(losses.min())
-        return least - math.log(float(self.weights @ np.exp(least - losses)) + 1e-12)
-
-    def update(self, innovations: tuple[Innovation, Innovation]) -> None:
-        """Correct both models by the measurement of `innovations`, and weight them by their likelihood."""
-        losses = np.array([innovation.negative_log_likelihood for innovation in innovations])
-        weights = self.weights * np.exp(losses.min() - losses)
-        for mode, innovation in zip(self.modes, innovations, strict=True):
-            mode.update(innovation)
-        self.weights = _normalised(weights / max(float(weights.sum()), 1e-300))
-
-    def _moments(self, weights: Array) -> tuple[Array, Array]:
-        one, other = self.modes
-        apart = one.state - other.state
-        first, second = weights.tolist()
-        state = first * one.state + second * other.state
-        covariance = first * one.covariance + second * other.covariance
-        return state, covariance + first * second * (apart[:, None] * apart)
+    def update(self, losses: Array) -> None:
+        """Weight the models by their likelihoods, given as negative logarithms (2,)."""
+        first, second = losses.tolist()
+        least = min(first, second)
+        self.weights = _normalised(
+            self.weights[0] * math.exp(least - first), self.weights[1] * math.exp(least - second)
+        )
 
 
-def _normalised(weights: Array) -> Array:
-    """Return weights (2,) that sum to one, none of them zero: the other model may be right at any time."""
-    held = np.maximum(weights, _LEAST_WEIGHT)
-    shares: Array = held / held.sum()
-    return shares
+def _normalised(calm: float, manoeuvring: float) -> tuple[float, float]:
+    """Return weights that sum to one, none of them zero: the other model may be right at any time."""
+    whole = max(calm + manoeuvring, 1e-300)
+    held = max(calm / whole, _LEAST_WEIGHT), max(manoeuvring / whole, _LEAST_WEIGHT)
+    return held[0] / (held[0] + held[1]), held[1] / (held[0] + held[1])

@@ -1,13 +1,13 @@
-"""A Kalman filter on the version, vergence and tilt that fixate a target, and what is measured of them.
+"""Kalman filters on the version, vergence and tilt that fixate a target, and what is measured of them.
 
 State (6,): version, its rate, vergence, its rate, tilt, its rate [rad, rad/s], all in the frame of the joints as they
 are estimated, so that the estimate is what has to be commanded. Directions measured in one eye are linear in
 it, at any distance: the left eye's pan to the target is version - vergence / 2, the right eye's version + vergence / 2.
 """
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,6 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 VERSION, VERGENCE, TILT = 0, 2, 4
-_IDENTITY = np.eye(6)
 _DEPTH_SHARE = 0.25
 """Vergence accelerates less than directions do: a quarter of it at 0.5 m already is a metre per second squared."""
 _RATE_HOLDS_S = 0.15
@@ -44,75 +43,84 @@ class Measurement:
         return np.array_equal(self.coefficients, other.coefficients)
 
 
-@dataclass(frozen=True)
-class Innovation:
-    """A measurement minus a model's prediction: `value` (n,) with its `covariance` (n, n).
+class Innovations(NamedTuple):
+    """A measurement minus each model's prediction, and what each model estimates with it.
 
-    `jacobian` (n, 6) is of the measurement by the state, `noise` (n,) the measurement's variances for this model, and
-    `distance` the squared Mahalanobis distance.
+    `values` (m, n) are the differences, `distances` (m,) their squared Mahalanobis distances, `losses` (m,) the
+    negative logarithms of the likelihoods without their constant term, `states` (m, 6) and `covariances` (m, 6, 6) the
+    corrected estimates.
     """
 
-    jacobian: Array
-    value: Array
-    noise: Array
-    covariance: Array
-    distance: float
-
-    @cached_property
-    def negative_log_likelihood(self) -> float:
-        """Negative logarithm of the likelihood, without its constant term."""
-        return 0.5 * (self.distance + math.log(np.linalg.det(self.covariance)))
+    values: Array
+    distances: Array
+    losses: Array
+    states: Array
+    covariances: Array
 
 
-class KalmanFilter:
-    """One model. `acceleration` > 0: constant velocity with that random acceleration; 0: at rest with random walk."""
+class KalmanModels:
+    """Several models of one target, which are predicted and updated together.
 
-    def __init__(self, acceleration_rad_s2: float, drift_rad_sqrt_s: float) -> None:
-        self._accelerations = {
-            VERSION: acceleration_rad_s2,
-            VERGENCE: _DEPTH_SHARE * acceleration_rad_s2,
-            TILT: acceleration_rad_s2,
-        }
-        self.moves = acceleration_rad_s2 > 0
-        self._drift = drift_rad_sqrt_s
-        self.state = np.zeros(6)
-        self.covariance = np.zeros((6, 6))
+    A model with an acceleration > 0 has constant velocity with that random acceleration, one with 0 is at rest with
+    random walk. Arrays that were read are never changed: a change is a new array.
+    """
+
+    def __init__(self, accelerations_rad_s2: Sequence[float], drifts_rad_sqrt_s: Sequence[float]) -> None:
+        accelerations = np.array(accelerations_rad_s2)
+        count = len(accelerations)
+        self._accelerations = accelerations
+        self._moves = (accelerations > 0).astype(np.float64)
+        self.states = np.zeros((count, 6))
+        """The state (6,) of each model."""
+        self.covariances = np.zeros((count, 6, 6))
+        """The covariance (6, 6) of each model."""
+        # The noise of a prediction by the powers of its duration: 1, 2, 3, 4.
+        self._noise = np.zeros((4, count, 6, 6))
+        for i, share in ((VERSION, 1.0), (VERGENCE, _DEPTH_SHARE), (TILT, 1.0)):
+            variances = np.square(share * accelerations)
+            self._noise[0, :, i, i] = np.square(drifts_rad_sqrt_s)
+            self._noise[1, :, i + 1, i + 1] = variances
+            self._noise[2, :, i, i + 1] = self._noise[2, :, i + 1, i] = 0.5 * variances
+            self._noise[3, :, i, i] = 0.25 * variances
 
     def predict(self, duration_s: float) -> None:
-        """Predict the state `duration_s` ahead."""
-        transition = _IDENTITY.copy()
-        noise = np.zeros((6, 6))
-        for i, acceleration in self._accelerations.items():
-            noise[i, i] = self._drift**2 * duration_s
-            if self.moves:
-                transition[i, i + 1] = duration_s
-                angle, rate = 0.5 * duration_s**2 * acceleration, duration_s * acceleration
-                noise[i, i] += angle * angle
-                noise[i, i + 1] = noise[i + 1, i] = angle * rate
-                noise[i + 1, i + 1] = rate * rate
-        self.state = transition @ self.state
-        self.covariance = transition @ self.covariance @ transition.T + noise
+        """Predict the states `duration_s` ahead."""
+        turned_s = (duration_s * self._moves)[:, None]
+        states, covariances = self.states.copy(), self.covariances.copy()
+        states[:, 0::2] += turned_s * states[:, 1::2]
+        covariances[:, 0::2] += turned_s[:, None] * covariances[:, 1::2]
+        covariances[:, :, 0::2] += turned_s[:, None] * covariances[:, :, 1::2]
+        powers = np.array([duration_s, duration_s**2, duration_s**3, duration_s**4])
+        noise = (powers @ self._noise.reshape(4, -1)).reshape(covariances.shape)
+        self.states, self.covariances = states, covariances + noise
 
-    def innovation(self, measurement: Measurement, now_s: float) -> Innovation:
-        """Compare a measurement with the state, which is of `now_s`; stamps may be earlier or later than that."""
-        jacobian = np.zeros((len(measurement.values), 6))
-        jacobian[:, 0::2] = measurement.coefficients
-        if self.moves:
-            jacobian[:, 1::2] = measurement.coefficients * (measurement.stamps_s - now_s)[:, None]
-        noise = measurement.sigmas**2
-        late_s = now_s - measurement.stamp_s - _RATE_HOLDS_S
-        if self.moves and late_s > 0:
-            noise = noise + (0.5 * self._accelerations[VERSION] * late_s**2) ** 2
-        covariance = jacobian @ self.covariance @ jacobian.T
-        covariance.flat[:: len(noise) + 1] += noise
-        value = measurement.values - jacobian @ self.state
-        distance = float(value @ np.linalg.solve(covariance, value))
-        return Innovation(jacobian, value, noise, covariance, distance)
+    def innovations(self, measurement: Measurement, now_s: float) -> Innovations:
+        """Compare a measurement with the states, which are of `now_s`; stamps may be earlier or later than that.
 
-    def update(self, innovation: Innovation) -> None:
-        """Correct the state by the measurement of `innovation`."""
-        gain = np.linalg.solve(innovation.covariance, innovation.jacobian @ self.covariance).T
-        self.state = self.state + gain @ innovation.value
-        # Joseph's form: the short one loses its positive variances where a certain measurement meets a vague prior.
-        kept = _IDENTITY - gain @ innovation.jacobian
-        self.covariance = kept @ self.covariance @ kept.T + (gain * innovation.noise) @ gain.T
+        Rows are independent of one another: each corrects what those before it have left, so that no system of
+        equations is to be solved.
+        """
+        states, covariances = self.states, self.covariances
+        jacobians = np.zeros((len(states), len(measurement.values), 6))
+        jacobians[:, :, 0::2] = measurement.coefficients
+        rates = measurement.coefficients * (measurement.stamps_s - now_s)[:, None]
+        jacobians[:, :, 1::2] = self._moves[:, None, None] * rates
+        late_s = max(now_s - measurement.stamp_s - _RATE_HOLDS_S, 0.0)
+        noises = measurement.sigmas**2 + ((0.5 * late_s**2 * self._accelerations) ** 2)[:, None]
+        values = measurement.values - (jacobians @ states[:, :, None])[:, :, 0]
+        distances, logarithms = np.zeros(len(states)), np.zeros(len(states))
+        for i, value in enumerate(measurement.values.tolist()):
+            row = jacobians[:, i]
+            crossed = (covariances @ row[:, :, None])[:, :, 0]
+            variances = (row * crossed).sum(axis=1) + noises[:, i]
+            scaled = crossed / variances[:, None]
+            off = value - (row * states).sum(axis=1)
+            states = states + scaled * off[:, None]
+            covariances = covariances - scaled[:, :, None] * crossed[:, None, :]
+            distances = distances + off * off / variances
+            logarithms = logarithms + np.log(variances)
+        return Innovations(values, distances, 0.5 * (distances + logarithms), states, covariances)
+
+    def update(self, innovations: Innovations) -> None:
+        """Correct the states by the measurement of `innovations`."""
+        self.states, self.covariances = innovations.states, innovations.covariances

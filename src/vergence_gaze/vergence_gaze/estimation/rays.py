@@ -4,11 +4,13 @@ A lens that is not on its axes moves as its eye turns, so that the angles which 
 distance a little. One eye alone gives them for an assumed vergence, with their slope over it; both eyes give them all.
 """
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
 from vergence_rig.geometry import EyeAngles
-from vergence_rig.kinematics import FarPoint, Kinematics
+from vergence_rig.kinematics import FarPoint, Kinematics, Place
 
 Array = npt.NDArray[np.float64]
 
@@ -50,20 +52,26 @@ def gaze_of_rays(
     the plane of the right image's column, at infinity or behind the eyes too. Raises UnreachableError.
     """
     lens, ray = _ray(kinematics, True, left_rad, left_xy)
-    column = kinematics.rotation_rig_from_optical(right_rad[1], right_rad[2]) @ (1.0, 0.0, -right_x)
-    across = float(column @ (kinematics.lens(False, right_rad[1], right_rad[2]) - lens))
-    w = float(column @ ray) / across
-    return _gaze_at(kinematics, lens, ray, w)
+    pan, tilt = float(right_rad[1]), float(right_rad[2])
+    column = kinematics.seen_direction(pan, tilt, 1.0, 0.0, -right_x)
+    x, y, z = kinematics.lens_place(False, pan, tilt)
+    apart = x - lens[0], y - lens[1], z - lens[2]
+    return _gaze_at(kinematics, lens, ray, _dot(column, ray) / _dot(column, apart))
 
 
-def _ray(kinematics: Kinematics, left: bool, angles_rad: Array, xy: tuple[float, float]) -> tuple[Array, Array]:
-    """Return an eye's lens (3,) and the unit ray (3,) of normalised coordinates, in rig_base."""
-    pan, tilt = angles_rad[0 if left else 1], angles_rad[2]
-    ray = kinematics.rotation_rig_from_optical(pan, tilt) @ (xy[0], xy[1], 1.0)
-    return kinematics.lens(left, pan, tilt), ray / np.linalg.norm(ray)
+def _ray(kinematics: Kinematics, left: bool, angles_rad: Array, xy: tuple[float, float]) -> tuple[Place, Place]:
+    """Return an eye's lens and the unit ray of normalised coordinates, in rig_base."""
+    pan, tilt = float(angles_rad[0 if left else 1]), float(angles_rad[2])
+    length = math.hypot(*xy, 1.0)
+    ray = kinematics.seen_direction(pan, tilt, xy[0] / length, xy[1] / length, 1.0 / length)
+    return kinematics.lens_place(left, pan, tilt), ray
 
 
-def _gaze_at(kinematics: Kinematics, lens: Array, ray: Array, w: float) -> EyeAngles:
+def _gaze_at(kinematics: Kinematics, lens: Place, ray: Place, w: float) -> EyeAngles:
     """Return the angles for the point on a ray at the inverse distance `w` [1/m] from the lens."""
-    x, y, z = (ray + w * lens).tolist()
+    x, y, z = (along + w * start for along, start in zip(ray, lens, strict=True))
     return kinematics.gaze(FarPoint(x, y, z, w))
+
+
+def _dot(one: Place, other: Place) -> float:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]

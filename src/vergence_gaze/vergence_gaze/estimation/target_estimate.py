@@ -53,9 +53,9 @@ class TargetEstimate:
     @cached_property
     def joint_sigmas_rad(self) -> Array:
         """Standard deviations (3,) of the joint angles that fixate the target."""
-        return np.sqrt(np.diag(_TO_JOINTS @ self.covariance @ _TO_JOINTS.T))
+        return np.asarray(np.sqrt((_TO_JOINTS @ self.covariance @ _TO_JOINTS.T).diagonal()))
 
-    @property
+    @cached_property
     def sigmas_rad(self) -> Array:
         """Standard deviations of the angles (3,)."""
-        return np.sqrt(np.diag(self.covariance))
+        return np.asarray(np.sqrt(self.covariance.diagonal()))

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vergence_gaze.estimation import jump_detector as jumps
-from vergence_gaze.estimation.imm_filter import ImmFilter
+from vergence_gaze.estimation.imm_filter import ImmWeights
 from vergence_gaze.estimation.jump_detector import RATE_SIGMA_RAD_S
-from vergence_gaze.estimation.kalman import TILT, VERGENCE, VERSION, Innovation, KalmanFilter, Measurement
+from vergence_gaze.estimation.kalman import TILT, VERGENCE, VERSION, Innovations, KalmanModels, Measurement
 from vergence_gaze.estimation.target_estimate import TargetEstimate
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +34,8 @@ _COMPARABLE_S = 0.5
 _MINIMUM_WEIGHT = 0.3
 _FOLLOWING_VARIANCE = 1e-5
 _KEPT_ESTIMATES = 8
+_REST = 0
+_MOTION = slice(1, 3)  # calm, manoeuvring
 
 
 class TargetFilter:
@@ -47,8 +49,9 @@ class TargetFilter:
         gate_sigma: float,
         jump_count: int,
     ) -> None:
-        self._rest = KalmanFilter(0.0, drift_rad_sqrt_s)
-        self._motion = ImmFilter(acceleration_rad_s2, manoeuvre_rad_s2)
+        accelerations = 0.0, acceleration_rad_s2, max(acceleration_rad_s2, manoeuvre_rad_s2)
+        self._models = KalmanModels(accelerations, (drift_rad_sqrt_s, 0.0, 0.0))
+        self._motion = ImmWeights()
         self._gate = gate_sigma**2
         self._jump_count = jump_count
         self._evidence = 0.0
@@ -82,11 +85,11 @@ class TargetFilter:
     def initialise(self, stamp_s: float, angles_rad: Array, covariance: Array) -> None:
         """Start with a target at these angles (3,) with this covariance (3, 3), of unknown speed."""
         self._estimates.clear()
-        state, whole = np.zeros(6), np.zeros((6, 6))
-        state[0::2], whole[0::2, 0::2] = angles_rad, covariance
-        self._rest.state, self._rest.covariance = state, whole.copy()
-        whole[1::2, 1::2] = np.eye(3) * RATE_SIGMA_RAD_S**2
-        self._motion.initialise(state, whole)
+        states, covariances = np.zeros((3, 6)), np.zeros((3, 6, 6))
+        states[:, 0::2], covariances[:, 0::2, 0::2] = angles_rad, covariance
+        covariances[_MOTION, 1::2, 1::2] = np.eye(3) * RATE_SIGMA_RAD_S**2
+        self._models.states, self._models.covariances = states, covariances
+        self._motion.reset((1.0, 0.0))
         self._evidence, self._moving = 0.0, False
         self._outliers.clear()
         self._time_s = stamp_s
@@ -106,8 +109,7 @@ class TargetFilter:
         extra[VERGENCE, VERGENCE] = left + right
         extra[VERSION, VERGENCE] = extra[VERGENCE, VERSION] = 0.5 * (right - left)
         extra[TILT, TILT] = tilt
-        for model in (self._rest, *self._motion.modes):
-            model.covariance = model.covariance + extra
+        self._models.covariances = self._models.covariances + extra
 
     def update(self, measurement: Measurement) -> bool:
         """Update by a measurement; returns False if it was too late or outside the gate (see `accept_jump`).
@@ -119,10 +121,9 @@ class TargetFilter:
             return False
         self._estimates.clear()
         self._predict(measurement.stamp_s)
-        rest = self._rest.innovation(measurement, self._time_s)
-        motion = self._motion.innovations(measurement, self._time_s)
-        self.last_innovation_rad = float(np.abs(motion[0].value).max())
-        if not self._within_gate(measurement, rest, motion):
+        innovations = self._models.innovations(measurement, self._time_s)
+        self.last_innovation_rad = float(np.abs(innovations.values[1]).max())
+        if not self._within_gate(measurement, innovations):
             comparable = [
                 before
                 for before in self._outliers
@@ -132,12 +133,13 @@ class TargetFilter:
             return False
         # A depth within the gate does not contradict a direction outside it.
         self._outliers = [before for before in self._outliers if not before.same_kind(measurement)]
-        advantage = rest.negative_log_likelihood - self._motion.negative_log_likelihood(motion)
+        losses = innovations.losses
+        advantage = float(losses[_REST]) - self._motion.loss(losses[_MOTION])
         moved = self._moving
         self._update_evidence(advantage, len(measurement.values))
         if moved and not self._moving:
-            rest = self._rest.innovation(measurement, self._time_s)  # from its new place
-        self._update_models(measurement, rest, motion)
+            innovations = self._models.innovations(measurement, self._time_s)  # from its new place
+        self._update_models(measurement, innovations)
         return True
 
     def accept_jump(self, measurement: Measurement) -> bool:
@@ -151,12 +153,13 @@ class TargetFilter:
         self._reopen(consistent[0], measurement)
         if jumps.continues_moving(consistent[0], measurement, self._bound(measurement)):
             self._moving, self._evidence = True, _EVIDENCE_TO_MOVE
-        motion = self._motion.innovations(measurement, self._time_s)
-        self._update_models(measurement, self._rest.innovation(measurement, self._time_s), motion)
+        self._update_models(measurement, self._models.innovations(measurement, self._time_s))
         return True
 
     def at(self, time_s: float) -> TargetEstimate:
         """Return the target at `time_s`. The extrapolated speed fades after a while, the uncertainty keeps growing."""
+        if not self._moving:
+            time_s = self._time_s  # at rest it is there at any time
         found = self._estimates.get(time_s)
         if found is None:
             if len(self._estimates) >= _KEPT_ESTIMATES:
@@ -165,35 +168,44 @@ class TargetFilter:
         return found
 
     def _extrapolated(self, time_s: float) -> TargetEstimate:
-        state, spread = self._motion.combined() if self._moving else (self._rest.state, self._rest.covariance)
+        if not self._moving:
+            state, spread = self._models.states[_REST], self._models.covariances[_REST]
+            return TargetEstimate(state[0::2], state[1::2], spread[0::2, 0::2], False)
+        state, spread = self._in_motion()
         ahead_s = min(max(time_s - self._time_s, -_LONGEST_PREDICTION_S), _LONGEST_PREDICTION_S)
         straight_s = min(ahead_s, _COAST_STRAIGHT_S)
         fade = math.exp(-(ahead_s - straight_s) / _COAST_FADE_S)
         angles = state[0::2] + state[1::2] * (straight_s + _COAST_FADE_S * (1.0 - fade))
         covariance = spread[0::2, 0::2]
-        if self._moving and ahead_s > 0:
+        if ahead_s > 0:
             cross = spread[0::2, 1::2]
             covariance = covariance + ahead_s * (cross + cross.T) + ahead_s**2 * spread[1::2, 1::2]
-        return TargetEstimate(angles, state[1::2] * fade, covariance, self._moving)
+        return TargetEstimate(angles, state[1::2] * fade, covariance, True)
+
+    def _in_motion(self) -> tuple[Array, Array]:
+        """Return state (6,) and covariance (6, 6) of the target in motion."""
+        return self._motion.combined(self._models.states[_MOTION], self._models.covariances[_MOTION])
 
     def _predict(self, stamp_s: float) -> None:
         duration_s = min(stamp_s - self._time_s, _LONGEST_PREDICTION_S)
         if duration_s > 0:
-            self._rest.predict(duration_s)
-            self._motion.predict(duration_s)
-            for model in (self._rest, *self._motion.modes):
-                largest = max(model.covariance.diagonal().tolist())
-                if largest > _LARGEST_VARIANCE:
-                    model.covariance *= _LARGEST_VARIANCE / largest
+            models = self._models
+            states, covariances = self._motion.mixed(models.states[_MOTION], models.covariances[_MOTION], duration_s)
+            models.states = np.concatenate((models.states[:1], states))
+            models.covariances = np.concatenate((models.covariances[:1], covariances))
+            models.predict(duration_s)
+            if models.covariances.max() > _LARGEST_VARIANCE:
+                largest = models.covariances.max(axis=(1, 2), keepdims=True)
+                models.covariances = models.covariances * np.minimum(1.0, _LARGEST_VARIANCE / largest)
             self._time_s = stamp_s
 
-    def _within_gate(self, measurement: Measurement, rest: Innovation, motion: tuple[Innovation, Innovation]) -> bool:
+    def _within_gate(self, measurement: Measurement, innovations: Innovations) -> bool:
         """Return whether a measurement is within the gate of a model that has enough weight."""
-        bound = self._bound(measurement)
-        if not self._moving and rest.distance <= bound:
+        bound, distances = self._bound(measurement), innovations.distances
+        if not self._moving and distances[_REST] <= bound:
             return True
-        likely = self._motion.weights > _MINIMUM_WEIGHT
-        return any(innovation.distance <= bound for innovation, yes in zip(motion, likely, strict=True) if yes)
+        pairs = zip(distances[_MOTION].tolist(), self._motion.weights, strict=True)
+        return any(distance <= bound and weight > _MINIMUM_WEIGHT for distance, weight in pairs)
 
     def _update_evidence(self, advantage: float, rows: int) -> None:
         """Add to the evidence for motion; when it is used up, the model at rest takes over the target's place."""
@@ -209,29 +221,28 @@ class TargetFilter:
         self._moving = self._evidence > _EVIDENCE_SURE or (self._evidence > _EVIDENCE_TO_MOVE and self._rate_is_sure())
 
     def _rate_is_sure(self) -> bool:
-        state, covariance = self._motion.combined()
+        state, covariance = self._in_motion()
         rates, spread = state[1::2], covariance[1::2, 1::2]
         return float(rates @ np.linalg.solve(spread, rates)) > _SIGNIFICANT_RATE
 
     def _copy_place_to_rest(self) -> None:
-        state, covariance = self._motion.combined()
-        # Arrays of their own: estimates that were returned before refer to the present ones.
-        self._rest.state, self._rest.covariance = self._rest.state.copy(), self._rest.covariance.copy()
-        self._rest.state[0::2] = state[0::2]
-        self._rest.covariance[0::2, 0::2] = covariance[0::2, 0::2] + np.eye(3) * _FOLLOWING_VARIANCE
+        state, covariance = self._in_motion()
+        models = self._models
+        models.states, models.covariances = models.states.copy(), models.covariances.copy()
+        models.states[_REST, 0::2] = state[0::2]
+        models.covariances[_REST, 0::2, 0::2] = covariance[0::2, 0::2] + np.eye(3) * _FOLLOWING_VARIANCE
 
-    def _update_models(self, measurement: Measurement, rest: Innovation, motion: tuple[Innovation, Innovation]) -> None:
-        self._motion.update(motion)
-        off = rest.distance / self._bound(measurement)
+    def _update_models(self, measurement: Measurement, innovations: Innovations) -> None:
+        models, off = self._models, float(innovations.distances[_REST]) / self._bound(measurement)
+        if off > 1.0 and not self._moving:
+            # It has moved somewhat: the farther, the less its old place counts.
+            models.covariances = models.covariances * np.array([off, 1.0, 1.0])[:, None, None]
+            innovations = models.innovations(measurement, self._time_s)
+        models.update(innovations)
+        self._motion.update(innovations.losses[_MOTION])
         if off > 1.0 and self._moving:
             # A model at rest outside its gate follows, so that it can take over when the target stops.
             self._copy_place_to_rest()
-        else:
-            if off > 1.0:
-                # It has moved somewhat: the farther, the less its old place counts.
-                self._rest.covariance = self._rest.covariance * off
-                rest = self._rest.innovation(measurement, self._time_s)
-            self._rest.update(rest)
         self.last_accepted_s = measurement.stamp_s
 
     def _bound(self, measurement: Measurement) -> float:
@@ -248,15 +259,18 @@ class TargetFilter:
             ways = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         else:
             ways = np.eye(3)
-        state, covariance = self._motion.combined()
+        state, covariance = self._in_motion()
         covariance[0::2, 0::2] += ways.T @ ways * _JUMP_SIGMA_RAD**2
         covariance[0::2, 1::2] = covariance[1::2, 0::2] = 0.0
         state[1::2], variances = (
             jumps.rates_between(before, measurement) if len(ways) == 3 else (0.0, RATE_SIGMA_RAD_S**2)
         )
         covariance[1::2, 1::2] = np.eye(3) * variances
-        self._motion.initialise(state, covariance, (0.5, 0.5))
-        self._rest.covariance = self._rest.covariance.copy()
-        self._rest.covariance[0::2, 0::2] += ways.T @ ways * _JUMP_SIGMA_RAD**2
+        models = self._models
+        rest = models.covariances[_REST].copy()
+        rest[0::2, 0::2] += ways.T @ ways * _JUMP_SIGMA_RAD**2
+        models.states = np.stack((models.states[_REST], state, state))
+        models.covariances = np.stack((rest, covariance, covariance))
+        self._motion.reset((0.5, 0.5))
         self._evidence, self._moving = 0.0, False
         self._outliers.clear()

@@ -136,7 +136,7 @@ class ShaftHistory:
     def reported_at(self, stamp_s: float) -> Array:
         """Return the angles (3,) at `stamp_s` as they would have been reported then; the ends are held."""
         before, after = self._reported.bracket(stamp_s)
-        if not (before.angles_rad != after.angles_rad).any():
+        if before is after or not (before.angles_rad != after.angles_rad).any():
             return before.angles_rad
         onset_s = self._onset_s(before.stamp, after.stamp)
         if onset_s is None:

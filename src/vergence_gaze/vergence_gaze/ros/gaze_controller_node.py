@@ -23,7 +23,7 @@ from vergence_common.stamps import to_seconds
 from vergence_common.two_rates import TwoRates
 from vergence_gaze.attention_parameters import POLICIES
 from vergence_gaze.control.controller import GazeController
-from vergence_gaze.control.report import Command, GazeReport
+from vergence_gaze.control.report import Command
 from vergence_gaze.estimation.observations import Observation, PointSighting
 from vergence_gaze.joints.frames import FrameError
 from vergence_gaze.parameter_groups import collected, gaze_groups
@@ -61,7 +61,7 @@ class GazeControllerNode(Node):
         self._controller = GazeController(self._rig, _parameters(settings), 1.0 / values.control_rate_hz)
         settings.on_change(self._on_parameters)
         self._arrived: list[Observation] = []
-        self._newest: GazeReport | None = None
+        self._newest: Command | None = None
         self._cycles = 0
         self._frames = PointFrames(self, self._controller)
 
@@ -85,7 +85,9 @@ class GazeControllerNode(Node):
         self._state = watch.create_publisher(GazeState, "gaze/state", matched=read)
         self._fixation = watch.create_publisher(PointStamped, "gaze/fixation_point", matched=read)
         self._markers = watch.create_publisher(MarkerArray, "gaze/markers", QoSProfile(depth=1), matched=read)
-        self._joint_input = JointStateInput(self, diagnostics, watch, lambda j: self._add(convert.joint_report(j)))
+        self._joint_input = JointStateInput(
+            self, diagnostics, watch, lambda j: self._add(convert.joint_report(j)), polled=True
+        )
         watch.create_subscription(
             JointState, "servo_node/resolution", lambda m: self._add(convert.joint_resolution(m)), latched
         )
@@ -104,6 +106,8 @@ class GazeControllerNode(Node):
 
     def destroy_node(self) -> None:
         """Destroy the subscriptions and action servers, too, which rclpy's node does not."""
+        self._joint_input.close()
+        self._vision.close()
         for info in self._camera_infos:
             info.close()
         for server in self._servers:
@@ -169,17 +173,23 @@ class GazeControllerNode(Node):
 
     def _read_cameras(self) -> None:
         for info in self._camera_infos:
-            info.read()
+            info.poll()
 
     def _end_rest(self) -> None:
         """Go on at the full rate, with what has arrived: something is requested or read."""
         if self._cycle_timer.set_fast(True):
-            arrived, self._arrived = self._arrived, []
-            self._controller.observe(arrived, self._now_s())
+            self._controller.observe(self._pop_arrived(), self._now_s())
+
+    def _pop_arrived(self) -> list[Observation]:
+        """Return what has arrived since the last time: the joints' reports before what the eyes saw at them."""
+        self._joint_input.poll()
+        self._vision.poll()
+        arrived, self._arrived = self._arrived, []
+        return arrived
 
     def _cycle(self) -> None:
-        now_s = self._now_s()
-        arrived, self._arrived = self._arrived, []
+        now_s = (self._cycle_timer.called_ns or 0) * 1e-9
+        arrived = self._pop_arrived()
         if self._cycles % _CAMERAS_EVERY == 0:
             self._read_cameras()
         self._cycles += 1
@@ -191,13 +201,13 @@ class GazeControllerNode(Node):
             server.forward_cancels(now_s)
         self._vision.update(self._controller.uses_images, monotonic())
         command = self._controller.step(now_s, arrived, self._joint_input.problem())
-        self._newest = command.report
+        self._newest = command
         for server in self._servers:
             server.on_cycle(command)
         self._publish(command, now_s)
 
     def _publish(self, command: Command, now_s: float) -> None:
-        report, (state_read, fixation_read, markers_read) = command.report, self._read
+        state_read, fixation_read, markers_read = self._read
         self._command.update(command.joints_rad, now_s)
         if command.track_request is not None:
             self._read_cameras()
@@ -205,13 +215,14 @@ class GazeControllerNode(Node):
         if command.object_request is not None:
             self._object_requests.publish(convert.object_request(command.object_request, now_s))
         if state_read:
-            self._state.publish(convert.gaze_state(report, now_s))
-        if fixation_read and math.isfinite(report.fixation_m[0]):
-            self._fixation.publish(convert.point_stamped(report.fixation_m, report.stamp_s))
+            self._state.publish(convert.gaze_state(command.report, now_s))
+        if fixation_read and math.isfinite(command.report.fixation_m[0]):
+            self._fixation.publish(convert.point_stamped(command.report.fixation_m, command.report.stamp_s))
         if self._cycles % _FEEDBACK_EVERY == 0:
             for server in self._servers:
-                server.publish_feedback(report)
+                server.publish_feedback(command)
         if markers_read and self._cycles % _MARKERS_EVERY == 0:
+            report = command.report
             half = 0.5 * report.vergence_rad
             angles = np.array([report.version_rad - half, report.version_rad + half, report.tilt_rad])
             if np.isfinite(angles).all():
@@ -234,9 +245,9 @@ class GazeControllerNode(Node):
 
     def _report(self) -> Report:
         self._update_readers()  # not every middleware reports matches
-        report, encoder = self._newest, self._controller.vergence_offset
-        if report is None:
+        if self._newest is None:
             return Report(WARN, "no control cycle yet")
+        report, encoder = self._newest.report, self._controller.vergence_offset
         if not math.isfinite(report.tilt_rad):
             level = ERROR if self._joint_input.reader.received else WARN
             return Report(level, report.reason, {"cycles": self._cycles})

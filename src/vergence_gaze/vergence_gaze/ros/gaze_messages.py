@@ -51,19 +51,19 @@ def track_sighting(message: TargetTrack, left_image: EyeImage) -> TrackSighting:
     """Return the track in normalised coordinates."""
     both = message.status in (TargetTrack.STATUS_OK, TargetTrack.STATUS_AMBIGUOUS)
     found = both or message.status == TargetTrack.STATUS_OCCLUDED
-    x, y = left_image.undistort([[message.left_x_px, message.left_y_px]])[0] if found else (math.nan, math.nan)
+    x, y = left_image.undistorted(message.left_x_px, message.left_y_px) if found else (math.nan, math.nan)
     candidates = zip(message.candidate_disparity_px, message.candidate_weight, strict=True)
     return TrackSighting(
         stamp_s=to_seconds(message.header.stamp),
         skew_s=message.pair_skew_s,
         track_id=message.track_id,
         lock_stamp_s=to_seconds(message.lock_stamp),
-        left_x=float(x),
-        left_y=float(y),
+        left_x=x,
+        left_y=y,
         disparity_rad=message.disparity_rad if both else math.nan,
         sigma_rad=message.sigma_px / left_image.fx_px,
         extent_rad=message.extent_width_px / left_image.fx_px,
-        usable=bool(found and math.isfinite(x) and math.isfinite(y)),
+        usable=found and math.isfinite(x) and math.isfinite(y),
         reason=message.reason,
         goal_id=message.goal_id,
         ambiguous=message.status == TargetTrack.STATUS_AMBIGUOUS,

@@ -23,8 +23,7 @@ class GoalServer:
         self.on_request: Callable[[], None] = lambda: None
         """Called before a request is looked at."""
         self._goals: dict[int, ServerGoalHandle] = {}
-        self._outcomes: dict[bytes, Outcome] = {}
-        self._newest: GazeReport | None = None
+        self._outcomes: dict[bytes, tuple[Outcome, GazeReport | None]] = {}
         self._server = ActionServer(
             node,
             action,
@@ -47,17 +46,16 @@ class GoalServer:
 
     def on_cycle(self, command: Command) -> None:
         """End the goals that have an outcome in this control cycle."""
-        self._newest = command.report
         for outcome in command.outcomes:
             handle = self._goals.pop(outcome.goal_id, None)
             if handle is not None:
-                self._end(handle, outcome)
+                self._end(handle, outcome, command.report)
 
-    def publish_feedback(self, report: GazeReport) -> None:
+    def publish_feedback(self, command: Command) -> None:
         """Publish the active goal's feedback."""
         for goal_id, handle in self._goals.items():
             if goal_id == self._controller.goal_id:
-                handle.publish_feedback(self._feedback(handle.request, report))
+                handle.publish_feedback(self._feedback(handle.request, command.report))
 
     def _goal(self, request: Any) -> Goal:
         """Return a request as the controller's goal; raises ValueError for one that cannot be."""
@@ -107,17 +105,18 @@ class GoalServer:
         try:
             goal = self._goal(handle.request)
         except ValueError as error:  # what it was checked with has changed meanwhile
-            self._end(handle, Outcome(0, Result.INVALID, str(error), 0.0))
+            self._end(handle, Outcome(0, Result.INVALID, str(error), 0.0), None)
             return
         self._goals[self._controller.look_at(goal, self._now_s())] = handle
 
-    def _end(self, handle: ServerGoalHandle, outcome: Outcome) -> None:
-        self._outcomes[bytes(handle.goal_id.uuid)] = outcome
+    def _end(self, handle: ServerGoalHandle, outcome: Outcome, report: GazeReport | None) -> None:
+        self._outcomes[bytes(handle.goal_id.uuid)] = outcome, report
         handle.execute()
 
     def _execute(self, handle: ServerGoalHandle) -> Any:
         """Return the result of a goal that has ended."""
-        outcome = self._ending(handle.request, self._outcomes.pop(bytes(handle.goal_id.uuid)))
+        ended, report = self._outcomes.pop(bytes(handle.goal_id.uuid))
+        outcome = self._ending(handle.request, ended)
         if self._succeeded(outcome.result):
             handle.succeed()
         elif outcome.result is Result.CANCELLED and handle.is_cancel_requested:
@@ -125,7 +124,7 @@ class GoalServer:
         else:
             handle.abort()
         self._on_ended(handle, outcome)
-        return self._result(outcome, self._newest)
+        return self._result(outcome, report)
 
     def _now_s(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9

@@ -5,10 +5,11 @@ Without them the metric nodes measure nothing, and after a while receive no imag
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 from rclpy.node import Node
-from rclpy.subscription import Subscription
 
+from vergence_common.polled_subscription import PolledSubscription
 from vergence_common.qos import QosWatch
 from vergence_gaze.estimation.observations import Observation
 from vergence_gaze.ros import gaze_messages as convert
@@ -19,7 +20,9 @@ _UNUSED_S = 5.0  # between two goals the subscriptions stay
 
 
 class VisionInput:
-    """Passes tracks, contrasts, boxes and eye rotations to `add`; `left_image` returns the left camera's image model.
+    """Passes tracks, contrasts, boxes and eye rotations to `add`, when it is polled.
+
+    `left_image` returns the left camera's image model.
 
     In simulated time the subscriptions stay: the clock waits for the measurements, in the order of the subscribers.
     """
@@ -31,8 +34,19 @@ class VisionInput:
         self._reads_edges = False
         self._stays = bool(node.get_parameter("use_sim_time").value)
         self._used_s = math.nan
-        self._subscriptions: list[Subscription] = []
+        self._subscriptions: list[PolledSubscription] = []
         self._subscribe()
+
+    def poll(self) -> None:
+        """Pass on what has arrived."""
+        for subscription in tuple(self._subscriptions):
+            subscription.poll()
+
+    def close(self) -> None:
+        """Receive nothing more."""
+        for subscription in self._subscriptions:
+            subscription.close()
+        self._subscriptions.clear()
 
     def update(self, used: bool, now_s: float) -> None:
         """Subscribe while the measurements are used, and for some seconds after; `now_s` is of a steady clock."""
@@ -41,26 +55,20 @@ class VisionInput:
         if used and not self._subscriptions:
             self._subscribe()
         elif self._subscriptions and now_s - self._used_s > _UNUSED_S and not self._stays:
-            for subscription in self._subscriptions:
-                self._node.destroy_subscription(subscription)
-            self._subscriptions.clear()
+            self.close()
 
     def _subscribe(self) -> None:
-        create = self._watch.create_subscription
-        self._subscriptions = [
-            create(TargetTrack, "vergence/track", self._on_track),
-            create(BoxVergence, "vergence/box", lambda m: self._add(convert.box_sighting(m, self._left_image().fx_px))),
-            create(EyeRotation, "vergence/eye_rotation", lambda m: self._add(convert.eye_rotation(m))),
-        ]
+        self._read(TargetTrack, "vergence/track", self._on_track)
+        self._read(BoxVergence, "vergence/box", lambda m: self._add(convert.box_sighting(m, self._left_image().fx_px)))
+        self._read(EyeRotation, "vergence/eye_rotation", lambda m: self._add(convert.eye_rotation(m)))
         if self._reads_edges:
             self._subscribe_edges()
 
     def _subscribe_edges(self) -> None:
-        self._subscriptions.append(
-            self._watch.create_subscription(
-                EdgeVergence, "vergence/edge", lambda m: self._add(convert.edge_contrast(m))
-            )
-        )
+        self._read(EdgeVergence, "vergence/edge", lambda m: self._add(convert.edge_contrast(m)))
+
+    def _read(self, message_type: Any, topic: str, on_message: Callable[[Any], None]) -> None:
+        self._subscriptions.append(PolledSubscription(self._node, self._watch, message_type, topic, on_message))
 
     def _on_track(self, message: TargetTrack) -> None:
         if message.contrast_window_px:

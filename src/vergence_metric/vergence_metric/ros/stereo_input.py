@@ -227,7 +227,7 @@ class StereoInput:
 
     def _read_infos(self) -> None:
         for info in self._infos:
-            info.read()
+            info.poll()
 
     def _cameras_report(self) -> Report:
         with self._lock:
