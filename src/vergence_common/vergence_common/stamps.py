@@ -32,6 +32,11 @@ def to_stamp(seconds: float) -> Time:
     return from_nanoseconds(round(seconds * _NS))
 
 
+def restamped(message: bytes, stamp_ns: int) -> bytes:
+    """Return a serialised message that begins with a std_msgs/Header with another stamp [ns]."""
+    return message[:4] + _STAMP[message[1] == 0].pack(*divmod(stamp_ns, _NS)) + message[STAMP_END:]
+
+
 def stamp_of_serialised(message: bytes) -> int:
     """Return the stamp [ns] of a serialised message that begins with a std_msgs/Header.
 

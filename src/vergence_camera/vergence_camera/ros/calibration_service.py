@@ -2,7 +2,7 @@
 
 from ament_index_python.packages import get_package_share_directory
 from rclpy.node import Node
-from sensor_msgs.msg import CameraInfo
+from rclpy.serialization import serialize_message
 from sensor_msgs.srv import SetCameraInfo
 from std_msgs.msg import Header
 
@@ -16,13 +16,14 @@ from vergence_camera.camera_info import (
 from vergence_camera.frame import Mode
 from vergence_camera.ros.camera_messages import calibration_from_message, camera_info_message
 from vergence_common.diagnostics import OK, WARN, Report
+from vergence_common.stamps import restamped
 
 
 class CalibrationService:
     """Holds the calibration of one camera and serves `set_camera_info`."""
 
-    def __init__(self, node: Node, url: str, name: str) -> None:
-        self._node, self._name = node, name
+    def __init__(self, node: Node, url: str, name: str, frame_id: str) -> None:
+        self._node, self._name, self._frame_id = node, name, frame_id
         self._path = calibration_path(url, name, get_package_share_directory)
         self._calibration: Calibration | None = None
         self._problem = f"no calibration at {self._path}: camera_info is blank"
@@ -33,17 +34,18 @@ class CalibrationService:
                 self._problem = f"{error}: camera_info is blank"
                 node.get_logger().warning(self._problem)
         self._size = (0, 0)
-        self._message = CameraInfo()
+        self._message = b""
         node.create_service(SetCameraInfo, "set_camera_info", self._set)
 
-    def message(self, width_px: int, height_px: int, header: Header) -> CameraInfo:
-        """Return the camera_info for a frame of that size: blank if the calibration is for another size."""
-        if (width_px, height_px) != self._size:
+    def message(self, width_px: int, height_px: int, stamp_ns: int) -> bytes:
+        """Return the serialised camera_info for a frame of that size: blank if the calibration is for another size.
+
+        It is the same for every frame but for its stamp.
+        """
+        if (width_px, height_px) != self._size or not self._message:
             self._size = (width_px, height_px)
             self._refresh()
-        message = self._message
-        message.header = header
-        return message
+        return restamped(self._message, stamp_ns)
 
     def set_mode(self, mode: Mode) -> None:
         """Compare the calibration with the stream, so that a wrong size is logged before the first frame."""
@@ -68,7 +70,9 @@ class CalibrationService:
                 f"{calibration.width_px}x{calibration.height_px}: camera_info is blank"
             )
             self._node.get_logger().warning(self._problem)
-        self._message = camera_info_message(calibration if self._has_size_of_stream() else None, *self._size, Header())
+        shown = calibration if self._has_size_of_stream() else None
+        message = camera_info_message(shown, *self._size, Header(frame_id=self._frame_id))
+        self._message = serialize_message(message)
 
     def _set(self, request: SetCameraInfo.Request, response: SetCameraInfo.Response) -> SetCameraInfo.Response:
         try:

@@ -74,7 +74,8 @@ class CameraNode(Node):
             qos.create_publisher(kind, topic, IMAGE_QOS, matched=self._update_subscribers) for kind, topic in topics
         )
         self._compressed, self._info, self._raw = self._publishers_of_frames
-        self._calibration = CalibrationService(self, settings.camera_info_url, settings.camera_name or eye or "camera")
+        name = settings.camera_name or eye or "camera"
+        self._calibration = CalibrationService(self, settings.camera_info_url, name, self._frame_id)
         self._stored = StoredImages(self, self._frame_id, self._jpeg)
         self._partner: PartnerCamera | None = None
         if settings.partner:
@@ -124,8 +125,7 @@ class CameraNode(Node):
             if jpeg_wanted:
                 self._compressed.publish(self._serialise(self._jpeg(frame), stamp.ros_ns))
             if info_wanted:
-                header = self._header(stamp)
-                self._info.publish(self._calibration.message(frame.width_px, frame.height_px, header))
+                self._info.publish(self._calibration.message(frame.width_px, frame.height_px, stamp.ros_ns))
             local_wanted = self._images.wanted(self._topic)
             if raw_wanted or local_wanted:
                 pixels, encoding = decode(frame)
