@@ -118,3 +118,17 @@ def test_a_requested_point_outside_the_image_is_named_and_the_target_stays(
     assert (after.track_id, after.goal_id) == (before.track_id, before.goal_id)
     assert "the point of goal 8" in measurement.unmet_request
     assert "must be in the 640x480 image" in measurement.unmet_request
+
+
+def test_a_point_of_the_right_image_that_the_left_eye_does_not_see_is_named(measurement: PairMeasurement) -> None:
+    other = np.random.default_rng(6).integers(0, 256, (480, 640, 3), np.uint8)
+    converging = EyeAngles(0.0, 0.2, 0.0)
+    shown = measurement.edge(view(0), other)
+    measurement.track(shown, 1.0, converging, None)
+    measurement.request_track(TrackRequest(8, 1.0, False, (5.0, 240.0)))
+    track = measurement.track(shown, 1.0 + 1.0 / 30.0, converging, None)
+    assert track.goal_id == 0
+    assert "the point of goal 8: the left eye does not see it" in measurement.unmet_request
+    measurement.request_track(TrackRequest(9, 1.0, False, (500.0, 240.0)))
+    assert measurement.track(shown, 1.0 + 2.0 / 30.0, converging, None).goal_id == 9
+    assert not measurement.unmet_request

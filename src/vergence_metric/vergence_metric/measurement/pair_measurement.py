@@ -16,11 +16,16 @@ from vergence_metric.measurement.edge_metric import AlignedPair, EdgeMetric, Edg
 from vergence_metric.measurement.foveal_vergence import FovealVergenceClassifier
 from vergence_metric.measurement.parameters import PairMeasurementParameters
 from vergence_metric.tracking.eye_view import EyeView, eye_views
-from vergence_metric.tracking.locking_tracker import is_inside
 from vergence_metric.tracking.motion.awaited_motion import AwaitedMotion
 from vergence_metric.tracking.protocol import Tracker
 from vergence_metric.tracking.registry import make_tracker
-from vergence_metric.tracking.request import PairMemory, StoredPair, TrackRequest
+from vergence_metric.tracking.request import (
+    PairMemory,
+    RequestedPointError,
+    StoredPair,
+    TrackRequest,
+    check_inside,
+)
 from vergence_metric.tracking.saccade_detector import StampedEyeAngles
 from vergence_metric.tracking.track import Track, TrackStatus
 from vergence_rig.camera import CameraModel
@@ -199,12 +204,12 @@ class PairMeasurement:
             pair = self._stored(request, seen, camera, edge.alignment)
             if pair is None:
                 self.unmet_request = f"no pair is stored for goal {request.goal_id}, stamp {request.stamp_s:.3f} s"
-            elif not is_inside(request.pixel, pair.left):
-                (x_px, y_px), (height, width) = request.pixel, pair.left.shape
-                place = f"({x_px:.1f}, {y_px:.1f}) px must be in the {width}x{height} image"
-                self.unmet_request = f"the point of goal {request.goal_id}: {place}"
-            else:
+                continue
+            try:
+                check_inside(request.pixel, pair.left)
                 tracker.request(request, pair)
+            except RequestedPointError as error:
+                self.unmet_request = f"the point of goal {request.goal_id}: {error}"
 
     def _unlocked(self, reason: str) -> Track:
         return Track.nowhere(self._newest_id, TrackStatus.UNLOCKED, reason)

@@ -8,9 +8,8 @@ these are it no longer looks like itself.
 """
 
 from vergence_metric.tracking.corner_cluster import CornerCluster
-from vergence_metric.tracking.eye_view import Pixel, distance
+from vergence_metric.tracking.eye_view import Pixel, distance, is_inside
 from vergence_metric.tracking.known_corners import KnownCorners
-from vergence_metric.tracking.locking_tracker import is_inside
 from vergence_metric.tracking.modelled_follower import Fix
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import NEVER, PatchSighting, RememberedPatch

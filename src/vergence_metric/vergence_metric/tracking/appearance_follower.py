@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from vergence_metric.disparity.protocol import Disparity, DisparityEstimator, DisparityStatus, Image
-from vergence_metric.tracking.eye_view import EyeView, distance
-from vergence_metric.tracking.locking_tracker import LockingTracker, fovea_of, is_inside
+from vergence_metric.tracking.eye_view import EyeView, distance, is_inside
+from vergence_metric.tracking.locking_tracker import LockingTracker, fovea_of
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.requested_target import (

@@ -17,9 +17,8 @@ from vergence_metric.tracking.affine_transfer import AffineCamera
 from vergence_metric.tracking.corner_association import MatchedCorners, match_corners
 from vergence_metric.tracking.corners import find_corners, match_right, patches_at, strongest_corner
 from vergence_metric.tracking.direction_filter import DirectionFilter
-from vergence_metric.tracking.eye_view import Pixel, Points
+from vergence_metric.tracking.eye_view import Pixel, Points, is_inside
 from vergence_metric.tracking.known_corners import KnownCorners
-from vergence_metric.tracking.locking_tracker import is_inside
 from vergence_metric.tracking.modelled_follower import Fix
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair

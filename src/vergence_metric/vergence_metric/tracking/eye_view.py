@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from vergence_metric.disparity.protocol import Image
 from vergence_rig.camera import CameraModel
 from vergence_rig.geometry import EyeAngles, rotation_rig_from_optical
 from vergence_rig.kinematics import Kinematics
@@ -91,3 +92,8 @@ def eye_views(camera: CameraModel, eyes: EyeAngles, kinematics: Kinematics) -> t
 def distance(a: Pixel, b: Pixel) -> float:
     """Return the distance of two pixels [px]."""
     return math.hypot(a[0] - b[0], a[1] - b[1])
+
+
+def is_inside(pixel: Pixel, image: Image) -> bool:
+    """Return whether a pixel lies in an image (h, w); False for NaN."""
+    return bool(0.0 <= pixel[0] <= image.shape[1] - 1 and 0.0 <= pixel[1] <= image.shape[0] - 1)

@@ -55,9 +55,9 @@ class LockingTracker:
 
     def request(self, request: TrackRequest, pair: StoredPair) -> None:
         """Follow a point of a stored pair from now on, on behalf of the request's goal."""
-        self._track_id += 1
+        target = self._follower.requested(self._track_id + 1, request, pair)
+        self._track_id, self._target = self._track_id + 1, target
         self._wants_lock, self._requested = False, True
-        self._target = self._follower.requested(self._track_id, request, pair)
 
     def lock_here(self) -> None:
         """Lock again on the object at the fovea as soon as the eyes are at rest, as after a saccade."""
@@ -150,8 +150,3 @@ class LockingTracker:
 def fovea_of(image: Image) -> Pixel:
     """Return the pixel of an ideal image's fovea, its middle."""
     return (image.shape[1] - 1) / 2, (image.shape[0] - 1) / 2
-
-
-def is_inside(pixel: Pixel, image: Image) -> bool:
-    """Return whether a pixel lies in an image; False for NaN."""
-    return bool(0.0 <= pixel[0] <= image.shape[1] - 1 and 0.0 <= pixel[1] <= image.shape[0] - 1)

@@ -11,7 +11,7 @@ from typing import Protocol
 
 from vergence_metric.disparity.protocol import DisparityEstimator
 from vergence_metric.tracking.eye_view import Pixel
-from vergence_metric.tracking.locking_tracker import LockingTracker, fovea_of, is_inside
+from vergence_metric.tracking.locking_tracker import LockingTracker, fovea_of
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.request import StoredPair, TrackRequest
 from vergence_metric.tracking.requested_target import pixel_in_left_eye
@@ -81,8 +81,7 @@ class ModelledFollower:
     def requested(self, track_id: int, request: TrackRequest, pair: StoredPair) -> Followed:
         """Return the target of a request."""
         point = request.pixel if request.left_eye else pixel_in_left_eye(request.pixel, pair, self._estimator)
-        inside = is_inside(point, pair.left)
-        model = self._learn(pair, point, request.extent_px) if inside else "it lies outside the left image"
+        model = self._learn(pair, point, request.extent_px)
         return Followed(track_id, pair.stamp_s, request.goal_id, model, pair.stamp_s)
 
     def locked(self, track_id: int, pair: StoredPair) -> tuple[Followed, Track] | str:

@@ -11,8 +11,8 @@ import numpy as np
 
 from vergence_metric.disparity.protocol import DisparityEstimator
 from vergence_metric.tracking.direction_filter import DirectionFilter
-from vergence_metric.tracking.eye_view import Pixel
-from vergence_metric.tracking.locking_tracker import LockingTracker, is_inside
+from vergence_metric.tracking.eye_view import Pixel, is_inside
+from vergence_metric.tracking.locking_tracker import LockingTracker
 from vergence_metric.tracking.modelled_follower import Fix, modelled_tracker
 from vergence_metric.tracking.motion.moving_region import MotionDetector, MovingRegion
 from vergence_metric.tracking.motion.region_points import RegionPoints, region_points

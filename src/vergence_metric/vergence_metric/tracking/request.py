@@ -4,7 +4,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from vergence_metric.disparity.protocol import Image
-from vergence_metric.tracking.eye_view import EyeView, Pixel
+from vergence_metric.tracking.eye_view import EyeView, Pixel, is_inside
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,17 @@ class StoredPair:
     left: Image
     right: Image
     views: tuple[EyeView, EyeView]
+
+
+class RequestedPointError(ValueError):
+    """A requested point of which nothing can be learnt: it lies outside the image."""
+
+
+def check_inside(pixel: Pixel, image: Image) -> None:
+    """Raise RequestedPointError unless a pixel lies in an image (h, w)."""
+    if not is_inside(pixel, image):
+        (x_px, y_px), (height, width) = pixel, image.shape
+        raise RequestedPointError(f"({x_px:.1f}, {y_px:.1f}) px must be in the {width}x{height} image")
 
 
 class PairMemory:

@@ -12,7 +12,7 @@ from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.own_pixels import SurfaceMasks
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import NEVER, RememberedPatch
-from vergence_metric.tracking.request import StoredPair, TrackRequest
+from vergence_metric.tracking.request import RequestedPointError, StoredPair, TrackRequest, check_inside
 from vergence_metric.tracking.sighted import in_both_eyes, in_left_eye
 from vergence_metric.tracking.surroundings import surroundings_disparity
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
@@ -167,11 +167,20 @@ def without_drift(
 
 
 def pixel_in_left_eye(pixel: Pixel, pair: StoredPair, estimator: DisparityEstimator) -> Pixel:
-    """Return where a point of the right image is in the left one; where it would be at infinity if not matched."""
+    """Return where a point of the right image is in the left one; where it would be at infinity if not matched.
+
+    Raises RequestedPointError for a point that the left eye does not see.
+    """
     last = pair.right.shape[1] - 1
     right, left = (np.ascontiguousarray(image[:, ::-1]) for image in (pair.right, pair.left))
     # Mirrored, the right image is the left one of a pair.
     disparity = estimator.estimate(right, left, (last - pixel[0], pixel[1]))
     if not disparity.ok:
-        return pair.views[0].pixel(pair.views[1].direction(pixel))
-    return pixel[0] + disparity.horizontal_px, pixel[1] - disparity.vertical_px
+        found = pair.views[0].pixel(pair.views[1].direction(pixel))
+    else:
+        found = pixel[0] + disparity.horizontal_px, pixel[1] - disparity.vertical_px
+    try:
+        check_inside(found, pair.left)
+    except RequestedPointError as error:
+        raise RequestedPointError(f"the left eye does not see it: {error}") from None
+    return found
