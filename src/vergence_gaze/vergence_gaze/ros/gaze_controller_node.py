@@ -193,10 +193,7 @@ class GazeControllerNode(Node):
         if self._cycles % _CAMERAS_EVERY == 0:
             self._read_cameras()
         self._cycles += 1
-        if not self._controller.rests(now_s) or any(self._read):
-            self._end_rest()
-        else:
-            self._cycle_timer.set_fast(False)
+        self._cycle_timer.set_fast(not self._controller.rests(now_s) or any(self._read))
         for server in self._servers:
             server.forward_cancels(now_s)
         self._vision.update(self._controller.uses_images, monotonic())
