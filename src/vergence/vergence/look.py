@@ -73,7 +73,7 @@ class Request:
         left = self.eye == "left"
         match name:
             case "pixel":
-                xy = _normalised(images[0 if left else 1], numbers)
+                xy = images[0 if left else 1].undistorted(*numbers)
                 depth_m = math.nan if self.depth_m is None else self.depth_m
                 nowhere = (math.nan, math.nan)
                 return Goal(
@@ -88,8 +88,8 @@ class Request:
             case "stereo_pixel":
                 return Goal(
                     GoalKind.STEREO_PIXEL,
-                    left_xy=_normalised(images[0], numbers[:2]),
-                    right_xy=_normalised(images[1], numbers[2:]),
+                    left_xy=images[0].undistorted(*numbers[:2]),
+                    right_xy=images[1].undistorted(*numbers[2:]),
                     stamp_s=stamp_s,
                     time_limit_s=self.time_limit_s,
                 )
@@ -109,8 +109,3 @@ class Request:
         if len(numbers) != length or not all(map(math.isfinite, numbers)):
             raise RequestError(f"{name} must be {length} finite numbers: got {shown(values)}")
         return numbers
-
-
-def _normalised(image: EyeImage, pixel: Sequence[float]) -> tuple[float, float]:
-    x, y = image.undistort([pixel])[0]
-    return float(x), float(y)

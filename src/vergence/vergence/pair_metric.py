@@ -189,11 +189,7 @@ def track_sighting(track: Track, models: Models, stamp_s: float, skew_s: float) 
     """
     focal_px = models[0].fx_px
     both, occluded = track.status in _BOTH, track.status is TrackStatus.OCCLUDED
-    x, y = (
-        (float(value) for value in models[0].undistort([track.left_px])[0])
-        if both or occluded
-        else (math.nan, math.nan)
-    )
+    x, y = models[0].undistorted(*track.left_px) if both or occluded else (math.nan, math.nan)
     angular = angular_disparity(*models, track.left_px, track.disparity_px, track.vertical_px)
     return TrackSighting(
         stamp_s=stamp_s,

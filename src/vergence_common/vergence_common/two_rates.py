@@ -18,8 +18,8 @@ class TwoRates:
     ) -> None:
         self._periods_ns = {True: round(1e9 * fast_s), False: round(1e9 * slow_s)}
         self._callback, self._clock = callback, clock or node.get_clock()
-        self.called_ns: int | None = None
-        """The clock's time at the newest call [ns]."""
+        self.called_ns = -1
+        """The clock's time at the newest call [ns]; negative before the first."""
         self.fast = True
         """Which period it has."""
         self.timer = node.create_timer(fast_s, self._call, clock=self._clock)

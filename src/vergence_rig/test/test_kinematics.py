@@ -72,6 +72,16 @@ def test_jacobian_of_the_point_is_that_of_differences(rig: Rig, point: tuple[flo
     assert k.point_jacobian(eyes) == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
 
 
+@given(_RIGS, st.booleans(), _between(0.8), _between(0.6), st.tuples(_between(1.0), _between(1.0), _between(1.0)))
+def test_plain_numbers_are_those_of_the_arrays(
+    rig: Rig, left: bool, pan: float, tilt: float, seen: tuple[float, float, float]
+) -> None:
+    k = Kinematics(rig)
+    turned = k.rotation_rig_from_optical(pan, tilt) @ seen
+    assert k.seen_direction(pan, tilt, *seen) == pytest.approx(tuple(turned), abs=1e-12)
+    assert k.lens_place(left, pan, tilt) == tuple(k.lens(left, pan, tilt))
+
+
 @given(_RIGS, st.booleans(), _between(0.8), _between(0.6))
 def test_jacobian_of_the_pose_is_that_of_differences(rig: Rig, left: bool, pan: float, tilt: float) -> None:
     k = Kinematics(rig)

@@ -134,9 +134,7 @@ class Kinematics:
             cos, sin = math.cos(self.pitch_rad), math.sin(self.pitch_rad)
             x, z = cos * x + sin * z, -sin * x + cos * z
         cos, sin = math.cos(pan_rad), math.sin(pan_rad)
-        x, y = cos * x - sin * y, sin * x + cos * y
-        cos, sin = math.cos(tilt_rad), math.sin(tilt_rad)
-        return cos * x + sin * z, y, -sin * x + cos * z
+        return self._to_rig(cos * x - sin * y, sin * x + cos * y, z, 0.0, tilt_rad)
 
     def pose_jacobian(self, left: bool, pan_rad: float, tilt_rad: float) -> tuple[Array, Array]:
         """Return how an eye's pose changes with its pan and the tilt.

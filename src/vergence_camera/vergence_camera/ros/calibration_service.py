@@ -42,7 +42,7 @@ class CalibrationService:
 
         It is the same for every frame but for its stamp.
         """
-        if (width_px, height_px) != self._size or not self._message:
+        if (width_px, height_px) != self._size:
             self._size = (width_px, height_px)
             self._refresh()
         return restamped(self._message, stamp_ns)

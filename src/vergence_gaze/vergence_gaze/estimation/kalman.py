@@ -75,13 +75,14 @@ class KalmanModels:
         self.covariances = np.zeros((count, 6, 6))
         """The covariance (6, 6) of each model."""
         # The noise of a prediction by the powers of its duration: 1, 2, 3, 4.
-        self._noise = np.zeros((4, count, 6, 6))
+        noise = np.zeros((4, count, 6, 6))
         for i, share in ((VERSION, 1.0), (VERGENCE, _DEPTH_SHARE), (TILT, 1.0)):
             variances = np.square(share * accelerations)
-            self._noise[0, :, i, i] = np.square(drifts_rad_sqrt_s)
-            self._noise[1, :, i + 1, i + 1] = variances
-            self._noise[2, :, i, i + 1] = self._noise[2, :, i + 1, i] = 0.5 * variances
-            self._noise[3, :, i, i] = 0.25 * variances
+            noise[0, :, i, i] = np.square(drifts_rad_sqrt_s)
+            noise[1, :, i + 1, i + 1] = variances
+            noise[2, :, i, i + 1] = noise[2, :, i + 1, i] = 0.5 * variances
+            noise[3, :, i, i] = 0.25 * variances
+        self._noise = noise.reshape(4, -1)
 
     def predict(self, duration_s: float) -> None:
         """Predict the states `duration_s` ahead."""
@@ -91,7 +92,7 @@ class KalmanModels:
         covariances[:, 0::2] += turned_s[:, None] * covariances[:, 1::2]
         covariances[:, :, 0::2] += turned_s[:, None] * covariances[:, :, 1::2]
         powers = np.array([duration_s, duration_s**2, duration_s**3, duration_s**4])
-        noise = (powers @ self._noise.reshape(4, -1)).reshape(covariances.shape)
+        noise = (powers @ self._noise).reshape(covariances.shape)
         self.states, self.covariances = states, covariances + noise
 
     def innovations(self, measurement: Measurement, now_s: float) -> Innovations:

@@ -188,7 +188,7 @@ class GazeControllerNode(Node):
         return arrived
 
     def _cycle(self) -> None:
-        now_s = (self._cycle_timer.called_ns or 0) * 1e-9
+        now_s = self._cycle_timer.called_ns * 1e-9
         arrived = self._pop_arrived()
         if self._cycles % _CAMERAS_EVERY == 0:
             self._read_cameras()

@@ -13,14 +13,12 @@ from vergence_rig.eye_image import EyeImage
 def goal(request: LookAt.Goal, point_m: tuple[float, float, float], left: EyeImage, right: EyeImage) -> Goal:
     """Return a LookAt goal; `point_m` is its point, already in rig_base. Raises ValueError for another kind or size."""
     stamp_s = to_seconds(request.header.stamp)
-    left_xy = left.undistort([[request.left_x_px, request.left_y_px]])[0]
-    right_xy = right.undistort([[request.right_x_px, request.right_y_px]])[0]
     return Goal(
         kind=GoalKind(request.kind),
         point_m=point_m,
         left_eye=request.eye == LookAt.Goal.EYE_LEFT,
-        left_xy=(float(left_xy[0]), float(left_xy[1])),
-        right_xy=(float(right_xy[0]), float(right_xy[1])),
+        left_xy=left.undistorted(request.left_x_px, request.left_y_px),
+        right_xy=right.undistorted(request.right_x_px, request.right_y_px),
         depth_m=request.depth_m if request.depth_m > 0 else math.nan,
         extent_rad=_extent_rad(request, left if request.eye == LookAt.Goal.EYE_LEFT else right),
         version_rad=request.version_rad,

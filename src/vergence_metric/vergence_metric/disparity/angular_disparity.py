@@ -30,13 +30,11 @@ def angular_disparity(
     if not all(map(math.isfinite, (*point_px, horizontal_px, vertical_px))):
         return AngularDisparity(math.nan, math.nan, math.nan, math.nan)
     x_px, y_px = point_px
-    (x_left, y_left), (x_right, y_right) = (
-        left.undistort([(x_px, y_px)])[0],
-        right.undistort([(x_px - horizontal_px, y_px - vertical_px)])[0],
-    )
+    x_left, y_left = left.undistorted(x_px, y_px)
+    x_right, y_right = right.undistorted(x_px - horizontal_px, y_px - vertical_px)
     return AngularDisparity(
-        horizontal_px=left.fx_px * float(x_left - x_right),
-        vertical_px=left.fy_px * float(y_left - y_right),
+        horizontal_px=left.fx_px * (x_left - x_right),
+        vertical_px=left.fy_px * (y_left - y_right),
         horizontal_rad=math.atan(x_left) - math.atan(x_right),
         vertical_rad=math.atan(y_left) - math.atan(y_right),
     )

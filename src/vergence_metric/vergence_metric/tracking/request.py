@@ -38,11 +38,11 @@ class RequestedPointError(ValueError):
     """A requested point of which nothing can be learnt: it lies outside the image."""
 
 
-def check_inside(pixel: Pixel, image: Image) -> None:
-    """Raise RequestedPointError unless a pixel lies in an image (h, w)."""
+def check_inside(pixel: Pixel, image: Image, otherwise: str = "") -> None:
+    """Raise RequestedPointError, which begins with `otherwise`, unless a pixel lies in an image (h, w)."""
     if not is_inside(pixel, image):
         (x_px, y_px), (height, width) = pixel, image.shape
-        raise RequestedPointError(f"({x_px:.1f}, {y_px:.1f}) px must be in the {width}x{height} image")
+        raise RequestedPointError(f"{otherwise}({x_px:.1f}, {y_px:.1f}) px must be in the {width}x{height} image")
 
 
 class PairMemory:

@@ -12,7 +12,7 @@ from vergence_metric.tracking.eye_view import EyeView, Pixel, distance
 from vergence_metric.tracking.own_pixels import SurfaceMasks
 from vergence_metric.tracking.parameters import TrackerParameters
 from vergence_metric.tracking.remembered_patch import NEVER, RememberedPatch
-from vergence_metric.tracking.request import RequestedPointError, StoredPair, TrackRequest, check_inside
+from vergence_metric.tracking.request import StoredPair, TrackRequest, check_inside
 from vergence_metric.tracking.sighted import in_both_eyes, in_left_eye
 from vergence_metric.tracking.surroundings import surroundings_disparity
 from vergence_metric.tracking.target_appearance import Sighting, TargetAppearance
@@ -179,8 +179,5 @@ def pixel_in_left_eye(pixel: Pixel, pair: StoredPair, estimator: DisparityEstima
         found = pair.views[0].pixel(pair.views[1].direction(pixel))
     else:
         found = pixel[0] + disparity.horizontal_px, pixel[1] - disparity.vertical_px
-    try:
-        check_inside(found, pair.left)
-    except RequestedPointError as error:
-        raise RequestedPointError(f"the left eye does not see it: {error}") from None
+    check_inside(found, pair.left, otherwise="the left eye does not see it: ")
     return found
